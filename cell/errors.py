@@ -1,0 +1,37 @@
+"""The errors this project raises on purpose: one line that names the culprit and the alternatives."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+
+class CellError(Exception):
+    """Base of every error this project raises on purpose; the command line turns it into exit 2."""
+
+
+class UnknownName(CellError):
+    """A name that does not exist, with the names that do and the nearest one.
+
+    Args:
+        kind: What was looked up, for example "part" or "configuration key".
+        name: The name that was not found.
+        known: The names that exist.
+    """
+
+    def __init__(self, kind: str, name: str, known: Iterable[str]) -> None:
+        names = sorted(known)
+        near = difflib.get_close_matches(name, names, n=1, cutoff=0.5)
+        hint = f" Did you mean '{near[0]}'?" if near else ""
+        super().__init__(f"No {kind} '{name}'.{hint} Known: {', '.join(names)}.")
+
+
+class BadPart(CellError):
+    """A part whose description cannot be used, with the reason."""
+
+    def __init__(self, name: str, reason: str) -> None:
+        super().__init__(f"Part '{name}': {reason}.")
+
+
+class BadOrder(CellError):
+    """An assembly order that does not list every part once."""
