@@ -1,0 +1,66 @@
+# Every verb creates and uses its own .venv from requirements.lock, once.
+PYTHON ?= python3
+VENV := .venv
+BIN := $(VENV)/bin
+INSTALLED := $(VENV)/installed
+ARGS ?=
+
+.PHONY: help setup system run test test-slow check format models clean
+
+help:
+	@echo "make setup      environment from the lock file, and what rendering needs of the system"
+	@echo "make run        assemble the motor unit in the twin; report in out/run (ARGS=... adds options)"
+	@echo "make test       fast tests"
+	@echo "make test-slow  long simulations"
+	@echo "make check      style, types"
+	@echo "make format     rewrite the sources in the project's style"
+	@echo "make models     write the generated models again"
+	@echo "make clean      remove the environment and everything generated outside models/"
+
+setup: system $(INSTALLED)
+
+run: $(INSTALLED)
+	$(BIN)/soft-jig assemble --out out/run $(ARGS)
+
+test: $(INSTALLED)
+	$(BIN)/python -m pytest -n auto $(ARGS)
+
+test-slow: $(INSTALLED)
+	$(BIN)/python -m pytest -n auto -m slow $(ARGS)
+
+check: $(INSTALLED)
+	$(BIN)/ruff check .
+	$(BIN)/ruff format --check .
+	$(BIN)/pyright
+
+format: $(INSTALLED)
+	$(BIN)/ruff check --fix .
+	$(BIN)/ruff format .
+
+models: $(INSTALLED)
+	$(BIN)/python -m cell.cad
+
+clean:
+	rm -rf $(VENV) build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
+	find cell planning experiments tests -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# A Debian without the package python3-venv cannot put pip into an environment; its pip can.
+$(INSTALLED): requirements.lock pyproject.toml
+	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV) || { \
+	  $(PYTHON) -m venv --clear --without-pip $(VENV) && \
+	  $(PYTHON) -m pip --python $(BIN)/python install pip; }
+	$(BIN)/pip install -r requirements.lock
+	$(BIN)/pip install -e . --no-deps
+	@touch $@
+
+# Pictures without a display need these two; without them everything else works.
+RENDER_PACKAGES := libegl1 libgl1-mesa-dri
+system:
+	@if dpkg -s $(RENDER_PACKAGES) >/dev/null 2>&1; then \
+	  true; \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && \
+	    apt-get update -qq && apt-get install -y -qq --no-install-recommends $(RENDER_PACKAGES); then \
+	  true; \
+	else \
+	  echo "For pictures in the report install: $(RENDER_PACKAGES)"; \
+	fi

@@ -1,0 +1,1 @@
+"""Run, measure, report: the command line and one readable script per experiment."""

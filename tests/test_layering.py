@@ -1,0 +1,39 @@
+"""The shape of the source tree: imports point one way, and no file outgrows a reader."""
+
+import ast
+from pathlib import Path
+
+import pytest
+
+ROOT = Path(__file__).resolve().parent.parent
+ALLOWED = {"cell": set(), "planning": {"cell"}, "experiments": {"cell", "planning"}}
+SOURCES = sorted(f for p in [*ALLOWED, "tests"] for f in (ROOT / p).rglob("*.py"))
+MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
+
+
+def imported_modules(file: Path) -> set[str]:
+    """Return the dotted names of the modules that a source file imports, at any level."""
+    nodes = list(ast.walk(ast.parse(file.read_text())))
+    names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
+    return names | {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+
+
+def name_of(file: Path) -> str:
+    return file.relative_to(ROOT).as_posix()
+
+
+@pytest.mark.parametrize("package", ALLOWED)
+def test_imports_point_one_way(package: str) -> None:
+    """Experiments may use planning, planning may use cell, and never back."""
+    for file in (ROOT / package).rglob("*.py"):
+        roots = {name.split(".")[0] for name in imported_modules(file)}
+        beyond = (roots & set(ALLOWED)) - {package} - ALLOWED[package]
+        assert not beyond, f"{name_of(file)} imports {sorted(beyond)}"
+
+
+@pytest.mark.parametrize("file", SOURCES, ids=name_of)
+def test_file_is_readable_and_imports_by_name(file: Path) -> None:
+    """No file over the limit; pydrake names come from their submodules; imports are absolute."""
+    assert len(file.read_text().splitlines()) <= MAX_LINES
+    assert "pydrake.all" not in imported_modules(file)
+    assert "" not in imported_modules(file), "relative import"
