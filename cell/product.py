@@ -41,8 +41,8 @@ class Part:
         mass: [kg].
         X_AP: Assembled pose in the product frame A.
         model: Name of the SDF model in ``models/sdf``, or None for a part that is only planned.
-        X_TrayP: Pose in which the parts tray presents the part, in its nest frame
-            (nest centre on the tray's top face, +z up); None for a part that is only planned.
+        X_TrayP: Pose in which the parts tray presents the part, in the tray's frame T (centre of
+            its base plate's top face, +z up); None for a part that is only planned.
         grasps: Ways to hold it, best first.
     """
 
@@ -94,6 +94,7 @@ class Product:
         fasteners: By the name of the bolt.
         up: Axis of the product frame that points up on the jig: "+x" ... "-z".
         contact_tolerance: Gap up to which two parts count as touching [m].
+        tray: Name of the SDF model of the tray that presents the parts, if there is one.
     """
 
     name: str
@@ -103,6 +104,7 @@ class Product:
     fasteners: Mapping[str, Fastener] = field(default_factory=dict)
     up: str = "+z"
     contact_tolerance: float = 5e-5
+    tray: str | None = None
 
     def members(self, item: str) -> tuple[str, ...]:
         """Return the part names behind an item of an order: a group's members, or the part."""

@@ -1,0 +1,22 @@
+"""Write every generated model: ``python -m cell.cad [FOLDER]`` (default ``models/sdf``)."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from cell.cad import motor_unit, tray
+from cell.paths import MODELS
+
+WRITERS = [motor_unit.write_models, tray.write_models]
+"""What writes the models, one function per module of this package."""
+
+
+def main(folder: Path) -> None:
+    """Write all models into a folder."""
+    for write in WRITERS:
+        write(folder)
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]) if len(sys.argv) > 1 else MODELS / "sdf")

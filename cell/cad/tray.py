@@ -1,0 +1,133 @@
+"""The parts tray of motor_unit: cradles for the motor, ledges for the plate, rails for the bolts.
+
+Frame T: origin at the centre of the base plate's top face, +z up. The nests leave room for a
+gripper that comes straight down: fingers reach 18 mm below the middle of a gripped part, and the
+wide pads pass outside of it. Stops leave 1 mm of play. Lengths in millimetres, all [D] from the
+parts and the gripper.
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import Box
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cell.cad.motor_unit import (
+    CAN_FACETS,
+    CAN_RADIUS,
+    GEARBOX_RADIUS,
+    HEAD_RADIUS,
+    MM,
+    box_piece,
+)
+from cell.cad.shapes import box, to_trimesh, vertex_radius
+from cell.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
+
+BASE = (260.0, 200.0, 8.0)
+PRINTED = 1240.0  # kg/m3, PLA [A].
+
+# The motor lies with its shaft along +y_T and its own +x down, so that the contact polygons of
+# gearbox (15 corners) and can (24 flats) are mirror images about the vertical.
+MOTOR_AXIS_X, MOTOR_FACE_Y, MOTOR_AXIS_Z = -70.0, 58.0, 32.0
+GEARBOX_CORNERS = 15  # [R] Drake's polygon for radius 18.4 mm at a hint of 8 mm.
+
+# The plate lies foot down with x_A along x_T.
+PLATE_X, PLATE_Y, PLATE_Z = 70.0, 40.0, 30.0
+
+# Bolts hang by their heads between two rails, 16 mm apart.
+BOLT_Y, BOLT_Z, BOLT_SPACING, RAIL_GAP = -70.0, 24.0, 16.0, 3.7
+
+PLASTIC = Contact(0.5, 1e8, dissipation=5.0)  # [A] printed polymer, stiff against part weights.
+BASE_GREY, NEST_TEAL = (0.22, 0.24, 0.27), (0.10, 0.48, 0.50)
+
+
+def motor_nest() -> list[Piece]:
+    """Return two V cradles and two end stops."""
+    gearbox = GEARBOX_RADIUS * np.cos(np.deg2rad(3.0))  # 45 degrees is 3 degrees off a corner.
+    can = vertex_radius(CAN_RADIUS, CAN_FACETS) * np.cos(np.pi / CAN_FACETS)
+    front = _cradle("motor_front", gearbox, y_low=38.0, y_high=54.0)
+    rear = _cradle("motor_rear", can, y_low=5.5, y_high=11.5)
+    x = MOTOR_AXIS_X
+    stops = [
+        box_piece("motor_stop_front", (x - 8, 59, 0), (x + 8, 62, 22), PLASTIC),
+        box_piece("motor_stop_rear", (x - 8, 0.6, 0), (x + 8, 3.6, 18.5), PLASTIC),
+    ]
+    return [*front, *rear, *stops]
+
+
+def _cradle(name: str, distance: float, y_low: float, y_high: float) -> list[Piece]:
+    """Return two slabs at 45 degrees whose faces are ``distance`` from the motor's axis [mm]."""
+    length, thickness = 12.0, 4.0
+    axis = np.array([MOTOR_AXIS_X, (y_low + y_high) / 2, MOTOR_AXIS_Z])
+    slabs = []
+    for side, sign in (("left", -1.0), ("right", 1.0)):
+        # The slab's z points at the axis.
+        R_TS = RotationMatrix.MakeYRotation(-sign * np.pi / 4)
+        center = axis - R_TS.matrix()[:, 2] * (distance + thickness / 2)
+        shape = Box(length * MM, (y_high - y_low) * MM, thickness * MM)
+        slabs.append(Piece(f"{name}_{side}", shape, PLASTIC, RigidTransform(R_TS, center * MM)))
+    return slabs
+
+
+def plate_nest() -> list[Piece]:
+    """Return two ledges under the face and four posts around the foot."""
+    x, y, z = PLATE_X, PLATE_Y, PLATE_Z
+    return [
+        box_piece("plate_ledge_left", (x - 29.5, y - 22, 0), (x - 20.5, y + 18, z), PLASTIC),
+        box_piece("plate_ledge_right", (x + 20.5, y - 22, 0), (x + 29.5, y + 18, z), PLASTIC),
+        box_piece("plate_stop_inner", (x - 15, y - 27, 0), (x + 15, y - 24, z - 6), PLASTIC),
+        box_piece("plate_stop_outer", (x - 15, y - 38, 0), (x + 15, y - 34, z - 6), PLASTIC),
+        box_piece("plate_stop_left", (x - 40, y - 33, 0), (x - 36, y - 28, z - 6), PLASTIC),
+        box_piece("plate_stop_right", (x + 36, y - 33, 0), (x + 40, y - 28, z - 6), PLASTIC),
+    ]
+
+
+def bolt_nest() -> list[Piece]:
+    """Return two rails; heads overlap each by 0.9 mm."""
+    half_gap, half_length = RAIL_GAP / 2, 2.5 * BOLT_SPACING + 3 * HEAD_RADIUS
+    y, z, width = BOLT_Y, BOLT_Z, 6.0
+    return [
+        box_piece(
+            "bolt_rail_near",
+            (-half_length, y - half_gap - width, 0),
+            (half_length, y - half_gap, z),
+            PLASTIC,
+        ),
+        box_piece(
+            "bolt_rail_far",
+            (-half_length, y + half_gap, 0),
+            (half_length, y + half_gap + width, z),
+            PLASTIC,
+        ),
+    ]
+
+
+def _webs() -> list[Look]:
+    """Return the blocks that carry the slabs of the motor's cradles; they are only seen."""
+    x = MOTOR_AXIS_X
+    looks = []
+    for name, y_low, y_high in (("web_front", 38.0, 54.0), ("web_rear", 5.5, 11.5)):
+        for side, low, high in (("left", -20.5, -9.0), ("right", 9.0, 20.5), ("middle", -9.0, 9.0)):
+            top = 3.0 if side == "middle" else 13.0
+            web = box_piece(name, (x + low, y_low, 0), (x + high, y_high, top), PLASTIC)
+            looks.append(Look(f"{name}_{side}", web.shape, NEST_TEAL, web.X_PS))
+    return looks
+
+
+def tray_model() -> Model:
+    """Return the tray; every contact piece is also seen."""
+    x, y, height = BASE
+    base = box_piece("base", (-x / 2, -y / 2, -height), (x / 2, y / 2, 0), PLASTIC)
+    nests = [*motor_nest(), *plate_nest(), *bolt_nest()]
+    looks = [Look("base_look", base.shape, BASE_GREY, base.X_PS), *_webs()]
+    looks += [Look(f"{p.name}_look", p.shape, NEST_TEAL, p.X_PS) for p in nests]
+    slab = to_trimesh(box((-x / 2, -y / 2, -height), (x / 2, y / 2, 0)).scale([MM, MM, MM]))
+    inertia = mesh_inertia(slab, PRINTED * slab.volume, "motor_unit_tray")
+    return Model("motor_unit_tray", inertia, [base, *nests], looks)
+
+
+def write_models(folder: Path) -> None:
+    """Write motor_unit_tray into ``folder`` (``models/sdf``)."""
+    write_model(folder, tray_model())
