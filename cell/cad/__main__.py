@@ -5,10 +5,15 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from cell.cad import motor_unit, tray
+from cell.cad import motor_unit, robots, tray, workcell
 from cell.paths import MODELS
 
-WRITERS = [motor_unit.write_models, tray.write_models]
+WRITERS = [
+    motor_unit.write_models,
+    tray.write_models,
+    robots.write_models,
+    workcell.write_models,
+]
 """What writes the models, one function per module of this package."""
 
 
