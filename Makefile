@@ -39,6 +39,7 @@ format: $(INSTALLED)
 
 models: $(INSTALLED)
 	$(BIN)/python -m cell.cad
+	$(BIN)/python -m cell.config_yaml
 
 clean:
 	rm -rf $(VENV) build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis

@@ -1,0 +1,216 @@
+"""Every number of the cell that a user may want to change, with unit, range and source.
+
+To add one, add a field with `setting(...)` to its section and run `make models`, which writes
+``models/config/default.yaml`` again. SI units inside, degrees where the name says ``_deg``.
+Source tags: [S] the paper, [R] read in a data sheet or public file, [M] measured, [D] derived,
+[A] assumption.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cell.config_file import changed, parse_overrides, read_config_file
+from cell.setting import setting
+from cell.soft_jig.parameters import JigParameters
+
+
+@dataclass(frozen=True)
+class SimulationConfig:
+    """How the physics is stepped and logged."""
+
+    time_step: float = setting(
+        1e-3, "s", "Step of the discrete plant; 2 ms slips parts twice as far [M].",
+        above=0.0, at_most=0.005,
+    )  # fmt: skip
+    contact_approximation: str = setting(
+        "lagged", "", "Drake's discrete contact approximation; thresholds of holding differ [M].",
+        choices=("lagged", "similar", "sap"),
+    )  # fmt: skip
+    log_period: float = setting(0.01, "s", "Time between two samples of the log [A].", above=0.0)
+
+
+@dataclass(frozen=True)
+class ArmConfig:
+    """Where an arm stands, how it waits and how stiff its position drive is."""
+
+    p_WB: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "m", "Base origin in W [A].")
+    rpy_deg: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "deg", "Base in W [A].")
+    home_deg: tuple[float, ...] = setting(
+        (0.0, -110.0, 110.0, -90.0, -90.0, 0.0), "deg",
+        "Joint angles to wait in, base to flange: forearm level, tool down [A].",
+        at_least=-360.0, at_most=360.0,
+    )  # fmt: skip
+    stiffness: tuple[float, ...] = setting(
+        (2e4, 2e4, 2e4, 5e3, 5e3, 5e3), "N m/rad", "Position drive; stable at any gain [A].",
+        above=0.0,
+    )  # fmt: skip
+    damping: tuple[float, ...] = setting(
+        (500.0, 500.0, 300.0, 60.0, 60.0, 60.0), "N m s/rad", "About critical, arm stretched [D].",
+        above=0.0,
+    )  # fmt: skip
+
+    @property
+    def X_WB(self) -> RigidTransform:
+        """Pose of the base."""
+        return RigidTransform(RollPitchYaw(np.deg2rad(self.rpy_deg)), np.array(self.p_WB))
+
+
+@dataclass(frozen=True)
+class WorkcellConfig:
+    """Where jig and tray are."""
+
+    p_WJ: tuple[float, float, float] = setting(
+        (0.0, 0.15, 0.20), "m", "Jig origin (top of its base plate) in W; the riser is below [A]."
+    )
+    jig_base_fixed: bool = setting(
+        True, "", "Bolted down (true) or free on the force plate (false), as in push tests [S]."
+    )
+    p_WT: tuple[float, float, float] = setting((-0.28, 0.42, 0.03), "m", "Tray origin in W [A].")
+    tray_yaw_deg: float = setting(0.0, "deg", "Tray about the vertical [A].")
+
+    @property
+    def X_WJ(self) -> RigidTransform:
+        """Pose of the jig frame while its base is where it was set down."""
+        return RigidTransform(np.array(self.p_WJ))
+
+    @property
+    def X_WT(self) -> RigidTransform:
+        """Nominal pose of the tray."""
+        rpy = RollPitchYaw(0.0, 0.0, np.deg2rad(self.tray_yaw_deg))
+        return RigidTransform(rpy, np.array(self.p_WT))
+
+
+@dataclass(frozen=True)
+class GripperConfig:
+    """The parallel-jaw gripper."""
+
+    max_force: float = setting(130.0, "N", "Largest grip force [R].", above=0.0, at_most=130.0)
+    speed: float = setting(0.15, "m/s", "Rate of the opening [R].", above=0.0, at_most=0.15)
+
+
+@dataclass(frozen=True)
+class DriverConfig:
+    """The electric screwdriver."""
+
+    free_speed: float = setting(30.0, "rad/s", "Spindle while the bolt runs down [M].", above=0.0)
+    seat_speed: float = setting(
+        10.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0
+    )
+    clutch_torque: float = setting(
+        0.5, "N m", "Torque at which it stops: M3 in a die-cast plate, 0.3 to 0.7 [A].",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    push_force: float = setting(
+        10.0, "N", "Thrust on the bit, 5 to 15 [A].", above=0.0, at_most=50.0
+    )
+
+
+@dataclass(frozen=True)
+class PlacementConfig:
+    """Pressing a part into the soft bed."""
+
+    press_force: float = setting(
+        20.0, "N", "Downward force that ends the pressing [A].", above=0.0, at_most=100.0
+    )
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Free motion of the arms."""
+
+    velocity_scale: float = setting(
+        0.3, "", "Share of the joint speed limits; slip in the jaws grows with it [M].",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    acceleration_limit: float = setting(4.0, "rad/s2", "Of every joint [A].", above=0.0)
+    arm_clearance: float = setting(0.02, "m", "Kept between the arms [A].", at_least=0.0)
+    obstacle_clearance: float = setting(
+        0.005, "m", "Kept between robot and surroundings [A].", at_least=0.0
+    )
+    max_iterations: int = setting(20000, "", "Of the sampling planner, per path [A].", at_least=1)
+
+
+@dataclass(frozen=True)
+class InsertionConfig:
+    """Compliant insertion of a shaft or boss into its hole."""
+
+    force_limit: float = setting(
+        10.0, "N", "Largest downward force; above it a sharp edge is squeezed in [M].",
+        above=0.0, at_most=30.0,
+    )  # fmt: skip
+    lateral_stiffness: float = setting(
+        4000.0, "N/m", "Of the compliance centred on the hole, 3000 to 6000 work [M].", above=0.0
+    )
+    rotational_stiffness: float = setting(
+        5.0, "N m/rad", "Stiffer leaves the plate tilted on the motor [M].", above=0.0
+    )
+    speed: float = setting(0.02, "m/s", "Of the descent [A].", above=0.0, at_most=0.1)
+    search_force: float = setting(3.0, "N", "Downward during the spiral [M].", above=0.0)
+    search_pitch: float = setting(
+        1.5e-4, "m", "Of the spiral, about twice the radial clearance [M].", above=0.0
+    )
+    search_speed: float = setting(5e-3, "m/s", "Along the spiral [A].", above=0.0)
+    search_radius: float = setting(1.5e-3, "m", "Where the search gives up [A].", above=0.0)
+
+
+@dataclass(frozen=True)
+class DisturbanceConfig:
+    """What is not where it should be; drawn once per run from the seed."""
+
+    tray_position_sigma: float = setting(0.0, "m", "Of the tray, x and y [A].", at_least=0.0)
+    tray_yaw_sigma_deg: float = setting(0.0, "deg", "Of the tray [A].", at_least=0.0)
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """Noise of the sensed poses of parts."""
+
+    position_noise: float = setting(0.0, "m", "Standard deviation per axis [A].", at_least=0.0)
+    angle_noise_deg: float = setting(
+        0.0, "deg", "Standard deviation about each axis [A].", at_least=0.0
+    )
+
+
+@dataclass(frozen=True)
+class CellConfig:
+    """The whole configuration, one section per machine or activity."""
+
+    simulation: SimulationConfig = SimulationConfig()
+    left_arm: ArmConfig = ArmConfig(
+        p_WB=(-0.55, 0.0, 0.0), home_deg=(180.0, -110.0, 110.0, -90.0, -90.0, 0.0)
+    )
+    right_arm: ArmConfig = ArmConfig(p_WB=(0.55, 0.0, 0.0))
+    workcell: WorkcellConfig = WorkcellConfig()
+    gripper: GripperConfig = GripperConfig()
+    driver: DriverConfig = DriverConfig()
+    jig: JigParameters = JigParameters()
+    placement: PlacementConfig = PlacementConfig()
+    motion: MotionConfig = MotionConfig()
+    insertion: InsertionConfig = InsertionConfig()
+    disturbance: DisturbanceConfig = DisturbanceConfig()
+    sensor: SensorConfig = SensorConfig()
+
+    @staticmethod
+    def load(
+        name_or_path: str | Path = "default",
+        overrides: Mapping[str, Any] | Sequence[str] = (),
+    ) -> CellConfig:
+        """Return the defaults, changed by a YAML file, changed by single overrides.
+
+        Args:
+            name_or_path: A name in ``models/config`` or a YAML file; it may be partial.
+            overrides: Dotted path -> value, or texts such as "simulation.time_step=0.002".
+        """
+        config = changed(CellConfig(), read_config_file(name_or_path))
+        return changed(config, parse_overrides(overrides))
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the configuration as nested dictionaries of plain values."""
+        return asdict(self)
