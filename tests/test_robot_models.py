@@ -220,12 +220,15 @@ def test_end_of_the_bit_is_bare_and_its_shaft_slender() -> None:
     assert _distance(query, [0.010, 0, 0.245]) >= 0.003
 
 
-@pytest.mark.parametrize("name", ["table", "riser", "force_plate", "jig_base"])
-def test_static_bodies_end_at_their_origin(name: str) -> None:
+@pytest.mark.parametrize(
+    ("name", "top"),
+    [("table", 0.0), ("jig_base", 0.0), ("force_plate", -0.025), ("riser", -0.06)],
+)
+def test_static_bodies_stack_up_to_the_jig_frame(name: str, top: float) -> None:
     diagram, plant, _ = load(name, name)
     query = _query(diagram, plant)
-    assert _distance(query, [0, 0, 0.01]) == pytest.approx(0.01, abs=1e-6)
-    assert _distance(query, [0, 0, -0.001]) == pytest.approx(-0.001, abs=1e-6)
+    assert _distance(query, [0, 0, top + 0.01]) == pytest.approx(0.01, abs=1e-6)
+    assert _distance(query, [0, 0, top - 0.001]) == pytest.approx(-0.001, abs=1e-6)
 
 
 def _query(diagram: Diagram, plant: MultibodyPlant) -> QueryObject:

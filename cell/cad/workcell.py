@@ -1,7 +1,8 @@
 """SDF models of what stands still: table, riser, force plate and the base of the jig.
 
-Each model has one link whose origin is the centre of its top face, with +z up and the body below,
-so that models are stacked by their heights. The builder welds them: static geometry must never
+Each model has one link. The table's origin is the centre of its top face; riser, force plate and jig
+base share the jig frame J (centre of the base plate's top face, +z up), so that one pose places the
+whole stack. The riser is as high as J is above the table. The builder welds them: static geometry must never
 belong to the world body, on which contact with locked parts crashes Drake 1.51 [M].
 
 Sources: [S] the paper; [D] derived from it; [A] assumption. All lengths in metres.
@@ -31,14 +32,18 @@ STEEL: Color = (0.40, 0.41, 0.43)
 DARK: Color = (0.20, 0.21, 0.22)
 TOP: Color = (0.62, 0.58, 0.50)
 
+CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 TABLE_SIZE = (1.8, 1.2, 0.05)  # [A]
 TABLE_HEIGHT = 0.75  # Above the floor; only seen [A].
-RISER_SIZE = (0.26, 0.26, 0.14)  # [A] lifts the jig into the reach of both arms.
 FORCE_PLATE_SIZE = (0.30, 0.30, 0.035)  # [A] a common size.
 JIG_DIAMETER, JIG_HEIGHT = 0.160, 0.025  # Diameter [S]; height [A].
 APERTURE_DIAMETER = 0.1166  # [D] of a cap with R = 60 mm that holds 296 cm3 [S].
 JIG_BASE_MASS = 1.05  # [A] 1.5 kg for the whole jig, less 0.45 kg of beads [S].
 RIM_HEIGHT = 0.006  # [A]
+J_HEIGHT = 0.20  # [A] of J above the table: in the reach of both arms.
+FORCE_PLATE_TOP = -JIG_HEIGHT  # In J.
+RISER_TOP = FORCE_PLATE_TOP - FORCE_PLATE_SIZE[2]
+RISER_SIZE = (0.26, 0.26, J_HEIGHT + RISER_TOP)
 
 # Rigid: every part that is set down has a compliant side. Friction of metal on metal [A].
 STATIC_CONTACT = Contact("rigid", friction=0.3, hint=0.05)
@@ -54,7 +59,7 @@ def table() -> SdfModel:
     model.visual("table", "top", box(x, y, z - 0.004), PROFILE, Pose(z=-z / 2 - 0.002))
     model.visual("table", "sheet", box(x, y, 0.004), TOP, Pose(z=-0.002))
     height = TABLE_HEIGHT - z
-    for i, (sx, sy) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
+    for i, (sx, sy) in enumerate(CORNERS):
         corner = Pose(sx * (x / 2 - 0.06), sy * (y / 2 - 0.06), -z - height / 2)
         model.visual("table", f"leg_{i}", box(0.08, 0.08, height), PROFILE, corner)
         foot = Pose(corner.x, corner.y, 0.01 - TABLE_HEIGHT)
@@ -69,11 +74,11 @@ def table() -> SdfModel:
 def riser() -> SdfModel:
     """Return the riser: two plates on four posts."""
     x, y, z = RISER_SIZE
-    model = _slab("riser", RISER_SIZE, mass=8.0)
+    model = _slab("riser", RISER_SIZE, mass=8.0, top=RISER_TOP)
     for name, height in (("top", -0.006), ("bottom", 0.006 - z)):
-        model.visual("riser", name, box(x, y, 0.012), ALUMINIUM, Pose(z=height))
-    for i, (sx, sy) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
-        post = Pose(sx * (x / 2 - 0.03), sy * (y / 2 - 0.03), -z / 2)
+        model.visual("riser", name, box(x, y, 0.012), ALUMINIUM, Pose(z=RISER_TOP + height))
+    for i, (sx, sy) in enumerate(CORNERS):
+        post = Pose(sx * (x / 2 - 0.03), sy * (y / 2 - 0.03), RISER_TOP - z / 2)
         model.visual("riser", f"post_{i}", box(0.045, 0.045, z - 0.024), PROFILE, post)
     return model
 
@@ -81,13 +86,14 @@ def riser() -> SdfModel:
 def force_plate() -> SdfModel:
     """Return the force plate: two aluminium plates with a load cell in each corner."""
     x, y, z = FORCE_PLATE_SIZE
-    model = _slab("force_plate", FORCE_PLATE_SIZE, mass=5.0)
-    model.visual("force_plate", "top", box(x, y, 0.014), ALUMINIUM, Pose(z=-0.007))
-    model.visual("force_plate", "bottom", box(x, y, 0.008), ALUMINIUM, Pose(z=0.004 - z))
-    for i, (sx, sy) in enumerate([(1, 1), (1, -1), (-1, 1), (-1, -1)]):
-        cell = Pose(sx * (x / 2 - 0.03), sy * (y / 2 - 0.03), -0.0205)
+    top = FORCE_PLATE_TOP
+    model = _slab("force_plate", FORCE_PLATE_SIZE, mass=5.0, top=top)
+    model.visual("force_plate", "top", box(x, y, 0.014), ALUMINIUM, Pose(z=top - 0.007))
+    model.visual("force_plate", "bottom", box(x, y, 0.008), ALUMINIUM, Pose(z=top + 0.004 - z))
+    for i, (sx, sy) in enumerate(CORNERS):
+        cell = Pose(sx * (x / 2 - 0.03), sy * (y / 2 - 0.03), top - 0.0205)
         model.visual("force_plate", f"cell_{i}", cylinder(0.018, 0.013), DARK, cell)
-        screw = Pose(cell.x, cell.y, 0.0)
+        screw = Pose(cell.x, cell.y, top)
         model.visual("force_plate", f"screw_{i}", cylinder(0.006, 0.001), STEEL, screw)
     return model
 
@@ -121,10 +127,10 @@ def jig_base() -> SdfModel:
     return model
 
 
-def _slab(name: str, size: tuple[float, float, float], mass: float) -> SdfModel:
-    """Return a model with one link and one collision box below its origin."""
+def _slab(name: str, size: tuple[float, float, float], mass: float, top: float = 0.0) -> SdfModel:
+    """Return a model with one link and one collision box whose top face is at z = ``top``."""
     model = SdfModel(name)
-    middle = -size[2] / 2
+    middle = top - size[2] / 2
     model.link(name, Inertia.of_box(mass, size, (0, 0, middle)))
     model.collision(name, name, box(*size), STATIC_CONTACT, Pose(z=middle))
     return model
