@@ -1,9 +1,10 @@
 """SDF models of what stands still: table, riser, force plate and the base of the jig.
 
-Each model has one link. The table's origin is the centre of its top face; riser, force plate and jig
-base share the jig frame J (centre of the base plate's top face, +z up), so that one pose places the
-whole stack. The riser is as high as J is above the table. The builder welds them: static geometry must never
-belong to the world body, on which contact with locked parts crashes Drake 1.51 [M].
+Each model has one link. The table's origin is the centre of its top face; riser, force plate and
+jig base share the jig frame J (centre of the base plate's top face, +z up), so that one pose places
+the whole stack. The riser is as high as J is above the table. The builder welds them: static
+geometry must never belong to the world body, on which contact with locked parts crashes Drake 1.51
+[M].
 
 Sources: [S] the paper; [D] derived from it; [A] assumption. All lengths in metres.
 """
