@@ -164,9 +164,10 @@ def _inertial(inertia: Inertia) -> str:
 def _visual(look: Look, uri: str) -> str:
     """Return a visual element."""
     color = " ".join(f"{c:.3g}" for c in (*look.color, 1.0))
+    mesh_uri = f"{uri}/{look.name}_visual.obj"
     return (
         f'      <visual name="{look.name}">\n        <pose>{_pose(look.X_PS)}</pose>\n'
-        f"        <geometry>{_geometry(look.shape, f'{uri}/{look.name}_visual.obj', False)}</geometry>\n"
+        f"        <geometry>{_geometry(look.shape, mesh_uri, False)}</geometry>\n"
         f"        <material><diffuse>{color}</diffuse></material>\n      </visual>\n"
     )
 
@@ -203,14 +204,14 @@ def _proximity(contact: Contact) -> list[str]:
 
 def _geometry(shape: Shape, mesh_uri: str, convex: bool) -> str:
     """Return the content of a geometry element."""
+    if isinstance(shape, trimesh.Trimesh):
+        declare = "<drake:declare_convex/>" if convex else ""
+        return f"<mesh>{declare}<uri>{mesh_uri}</uri></mesh>"
     if isinstance(shape, Box):
         size = " ".join(_number(v) for v in shape.size())
         return f"<box><size>{size}</size></box>"
-    if isinstance(shape, Cylinder):
-        radius, length = _number(shape.radius()), _number(shape.length())
-        return f"<cylinder><radius>{radius}</radius><length>{length}</length></cylinder>"
-    declare = "<drake:declare_convex/>" if convex else ""
-    return f"<mesh>{declare}<uri>{mesh_uri}</uri></mesh>"
+    radius, length = _number(shape.radius()), _number(shape.length())
+    return f"<cylinder><radius>{radius}</radius><length>{length}</length></cylinder>"
 
 
 def _pose(X: RigidTransform) -> str:

@@ -56,6 +56,7 @@ PLATE_X, PLATE_Y_LOW, PLATE_Y_HIGH, PLATE_THICKNESS = 35.0, -33.0, 27.0, 5.0
 FOOT_THICKNESS, FOOT_BOTTOM = 5.0, -15.0
 FOOT_HOLE_RADIUS, FOOT_HOLE_X, FOOT_HOLE_Z = 2.25, 29.0, -10.0
 BOLT_HOLE_RADIUS = 1.7
+WASHER_RADIUS = 3.4  # [D] more than the head's 2.75; at 3.5 it would fill the bore's chamfer.
 ALUMINIUM = 2700.0  # kg/m3; the material is not in the files [A].
 
 # Bolts: six, every 60 degrees about the gearbox axis [M]; socket head cap screw.
@@ -182,8 +183,8 @@ def plate_pieces() -> list[Piece]:
     """
     washer = Contact(lumped_head_friction())
     pieces = [Piece("bore", _bore_ring(), Contact(FIT_FRICTION))]
-    profile = [(BOLT_HOLE_RADIUS, 0.0), (4.0, 0.0), (4.0, PLATE_THICKNESS)]
-    profile += [(BOLT_HOLE_RADIUS, PLATE_THICKNESS)]
+    top, outer = PLATE_THICKNESS, WASHER_RADIUS
+    profile = [(BOLT_HOLE_RADIUS, 0.0), (outer, 0.0), (outer, top), (BOLT_HOLE_RADIUS, top)]
     for k, (x, y) in enumerate(bolt_xy()):
         ring = revolved_surface(_mm(profile), 16, center=(x * MM, y * MM))
         pieces.append(Piece(f"washer_{k}", ring, washer))

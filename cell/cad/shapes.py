@@ -38,13 +38,18 @@ def hexagon_prism(across_flats: float, z_low: float, z_high: float) -> Manifold:
 def shank(radius: float, z_low: float, z_high: float, chamfer: float, facets: int) -> Manifold:
     """Return a cylinder whose lower end has a 45 degree chamfer."""
     profile = [(0, z_low), (radius - chamfer, z_low), (radius, z_low + chamfer), (radius, z_high)]
-    return Manifold.revolve(CrossSection([[*profile, (0, z_high)]]), facets)
+    return _turn([*profile, (0, z_high)], facets)
 
 
 def boss(radius: float, z_low: float, z_high: float, chamfer: float, facets: int = 96) -> Manifold:
     """Return a cylinder whose upper end has a 45 degree chamfer."""
     profile = [(0, z_low), (radius, z_low), (radius, z_high - chamfer), (radius - chamfer, z_high)]
-    return Manifold.revolve(CrossSection([[*profile, (0, z_high)]]), facets)
+    return _turn([*profile, (0, z_high)], facets)
+
+
+def _turn(profile: Sequence[tuple[float, float]], facets: int) -> Manifold:
+    """Return the solid that a half section (r, z) sweeps around the z axis."""
+    return Manifold.revolve(CrossSection([np.array(profile, dtype=float)]), facets)
 
 
 def to_trimesh(solid: Manifold) -> trimesh.Trimesh:
