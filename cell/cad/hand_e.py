@@ -49,8 +49,8 @@ PAD = (0.003, 0.016, 0.020)
 WING_OFFSET = 0.012  # The wing's face stands back behind the pad's face.
 WING_Y = 0.022
 WING = (0.004, 0.016, 0.020)
-NOSE = (0.002, 0.003, 0.008)
-NOSE_Z = (0.010, 0.0165)  # Where the nose begins; where its frame sits.
+NOSE = (0.002, 0.003, 0.014)
+NOSE_Z = (0.010, 0.0225)  # Where the nose begins; where its frame sits.
 
 # Rubberised steel: one modulus for all pads. A 40 N grip indents a pad by tenths of a mm [M].
 PAD_CONTACT = Contact("compliant", friction=0.8, modulus=1e7, dissipation=5.0, hint=0.02)  # [A]

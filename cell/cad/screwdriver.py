@@ -1,7 +1,9 @@
 """SDF of the electric driver: an inline driver held by a general-purpose gripper on the flange.
 
 The gripper that holds the driver never opens, so it and the housing are one rigid ``body``. The
-``bit`` turns on ``spindle_joint`` about +z of ``mount``. The last 10 mm of the bit have no
+bit holder floats on two lateral slides and one axial slide with springs, as the heads of
+screwdriving robots do; the ``bit`` turns in it on ``spindle_joint`` about +z of ``mount``. The last
+10 mm of the bit have no
 collision shape: bit and socket are joined by a constraint when they meet within their tolerances,
 and the hex inside the socket would otherwise push the bolt about.
 
@@ -46,6 +48,10 @@ HEX_FLATS, HEX_LENGTH = 0.0025, 0.014
 HOLDER_LENGTH, HOLDER_RADIUS, HOLDER_MASS = 0.095, 0.0375, 0.9
 DRIVER_MASS = 0.45
 BIT_MASS = 0.010
+# Floating bit holder [A]: travel of commercial compliant heads is a few millimetres.
+FLOAT_MASS = 0.020  # Of each slide.
+FLOATS = (("x", (1.0, 0.0, 0.0), 0.002), ("y", (0.0, 1.0, 0.0), 0.002), ("z", (0.0, 0.0, 1.0), 0.010))
+FLOAT_EFFORT = 50.0  # Of the springs [N].
 # Rotor and gear train seen at the spindle [A]: a 20 W driver motor of 1e-7 kg m2 behind 10:1.
 SPINDLE_INERTIA = 1e-5
 SPINDLE_EFFORT = 1.0  # [N m]; the clutch acts below it.
@@ -61,6 +67,7 @@ def screwdriver() -> SdfModel:
     _add_bit(model)
     model.frame("mount", "body")
     model.frame("bit_tip", "bit", Pose(z=SHAFT_LENGTH))
+    model.ignore_contact_between("driver", ["body", "bit"])
     return model
 
 
@@ -113,7 +120,7 @@ def _add_bit(model: SdfModel) -> None:
     model.joint(
         "spindle_joint",
         "continuous",
-        "body",
+        _add_floats(model),
         "bit",
         velocity=SPINDLE_SPEED,
         effort=SPINDLE_EFFORT,
@@ -128,6 +135,28 @@ def _add_bit(model: SdfModel) -> None:
     model.visual("bit", "hex", model.mesh("hex", hexagon), STEEL, Pose(z=SHAFT_LENGTH - 0.007))
     felt = SHAFT_LENGTH - BARE_END
     model.collision("bit", "shaft", cylinder(SHAFT_RADIUS, felt), CONTACT, Pose(z=felt / 2))
+
+
+def _add_floats(model: SdfModel) -> str:
+    """Add the slides of the bit holder; return the last link of the chain."""
+    parent = "body"
+    for name, axis, travel in FLOATS:
+        link = f"float_{name}"
+        inertia = Inertia.of_cylinder(FLOAT_MASS, NOSE_RADIUS, NOSE_LENGTH, (0, 0, 0))
+        model.link(link, inertia, parent="body", pose=Pose(z=SHAFT_Z))
+        model.joint(
+            f"float_{name}_joint",
+            "prismatic",
+            parent,
+            link,
+            axis=axis,
+            position=(-travel, travel),
+            velocity=1.0,
+            effort=FLOAT_EFFORT,
+            damping=0.0,
+        )
+        parent = link
+    return parent
 
 
 def write_models(folder: Path) -> None:
