@@ -1,0 +1,97 @@
+"""Many small convex polygons at once: clip by half planes, measure, and merge."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import manifold3d
+import numpy as np
+
+from planning.envelope import cross
+
+
+@dataclass(frozen=True, eq=False)
+class Polygons:
+    """Convex polygons, counter-clockwise, in arrays padded to the longest.
+
+    Attributes:
+        corners: (n, k, 2) [m]; corners from ``count`` on are padding.
+        count: (n,) number of corners; 0 for an empty polygon.
+    """
+
+    corners: np.ndarray
+    count: np.ndarray
+
+    def clipped(self, signed: np.ndarray) -> Polygons:
+        """Keep the side where a linear function is not negative (Sutherland and Hodgman).
+
+        Args:
+            signed: (n, k) value of each polygon's linear function at its corners.
+        """
+        k = self.corners.shape[1]
+        column = np.arange(k)
+        valid = column < self.count[:, None]
+        following = np.where(column + 1 < self.count[:, None], column + 1, 0)
+        signed_next = np.take_along_axis(signed, following, 1)
+        corners_next = np.take_along_axis(self.corners, following[:, :, None], 1)
+        kept = valid & (signed >= 0.0)
+        crossed = valid & ((signed >= 0.0) != (signed_next >= 0.0))
+        share = np.divide(signed, signed - signed_next, out=np.zeros_like(signed), where=crossed)
+        crossings = self.corners + share[:, :, None] * (corners_next - self.corners)
+        # Each corner is followed by the crossing on its edge; dropping the unused slots leaves the
+        # clipped outline in order. Clipping a convex polygon adds at most one corner.
+        corners = np.stack([self.corners, crossings], axis=2).reshape(len(signed), 2 * k, 2)
+        used = np.stack([kept, crossed], axis=2).reshape(len(signed), 2 * k)
+        order = np.argsort(~used, axis=1, kind="stable")[:, : k + 1]
+        return Polygons(np.take_along_axis(corners, order[:, :, None], 1), used.sum(axis=1))
+
+    def closed(self) -> np.ndarray:
+        """Return the corners with the padding collapsed onto the first one, (n, k, 2)."""
+        valid = np.arange(self.corners.shape[1]) < self.count[:, None]
+        return np.where(valid[:, :, None], self.corners, self.corners[:, :1])
+
+    def areas(self) -> np.ndarray:
+        """Return the areas, (n,) [m^2]."""
+        corners = self.closed()
+        return 0.5 * cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
+
+    def inradius_bounds(self) -> np.ndarray:
+        """Return a lower bound on each polygon's inscribed radius, area over perimeter [m]."""
+        corners = self.closed()
+        edges = np.roll(corners, -1, axis=1) - corners
+        perimeter = np.linalg.norm(edges, axis=2).sum(axis=1)
+        return np.divide(self.areas(), perimeter, out=0.0 * perimeter, where=perimeter > 0.0)
+
+    def centre(self, index: int) -> np.ndarray:
+        """Return a point (2,) inside one polygon: the mean of its corners."""
+        return self.corners[index, : self.count[index]].mean(axis=0)
+
+    def chosen(self, which: np.ndarray) -> Polygons:
+        """Return the polygons at the given indices or mask."""
+        return Polygons(self.corners[which], self.count[which])
+
+    def outlines(self) -> list[np.ndarray]:
+        """Return each polygon without its padding."""
+        return [corners[:count] for corners, count in zip(self.corners, self.count, strict=True)]
+
+
+def triangle_overlaps(a: np.ndarray, b: np.ndarray) -> Polygons:
+    """Intersect triangles pairwise; both (n, 3, 2), counter-clockwise."""
+    polygons = Polygons(a, np.full(len(a), 3))
+    for edge in range(3):
+        start, end = b[:, edge], b[:, (edge + 1) % 3]
+        offsets = polygons.corners - start[:, None]
+        polygons = polygons.clipped(cross((end - start)[:, None], offsets))
+    return polygons
+
+
+def point_in_wide_union(outlines: list[np.ndarray], radius: float) -> np.ndarray | None:
+    """Return a point (2,) of the union that a disc of the radius [m] fits around, if one does."""
+    # Clipper rounds to fixed decimals: measuring in radii keeps any size of part away from that.
+    scaled = [outline / radius for outline in outlines]
+    union = manifold3d.CrossSection(scaled, manifold3d.FillRule.NonZero)
+    # Growing by a thousandth first closes the seams that rounding leaves between neighbours.
+    seam = 1e-3
+    grown = union.offset(seam, manifold3d.JoinType.Miter)
+    core = grown.offset(-1.0 - seam, manifold3d.JoinType.Round)
+    return None if core.is_empty() else radius * np.array(core.to_polygons()[0][0])

@@ -1,0 +1,100 @@
+"""From a product and an order to its fixing plan: the planner's stages in a row."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from cell.errors import CellError, UnknownName
+from cell.product import Product
+from planning.checks import check_overlaps, cut_threads
+from planning.contact import contact_matrix
+from planning.directions import DIRECTIONS
+from planning.fixing import FixingStep, Geometry, Stop, configure_fixing
+from planning.interference import FIT_TOLERANCE, Blocker, interference
+from planning.order import check_order, default_order
+from planning.reachability import reachable_matrices
+from planning.solids import solids_of
+
+
+@dataclass(frozen=True, eq=False)
+class FixingPlan:
+    """Which part the jig holds, in which posture, while each item of the order is added.
+
+    Attributes:
+        product: Name of the product.
+        order: Items in the order of assembly.
+        parts: Names of the n parts, in matrix order.
+        contact: (n, n) int, strictly upper triangular C.
+        free: Per direction the (n, n) int matrix M_j.
+        reachable: Per direction the (n, n) int matrix W_j.
+        blockers: Evidence for every 0 of the M_j.
+        steps: One per item that comes in, up to where Algorithm 1 stopped.
+        stop: Why it stopped, or None if the order is feasible.
+        seconds: Time that planning took [s].
+    """
+
+    product: str
+    order: tuple[str, ...]
+    parts: tuple[str, ...]
+    contact: np.ndarray
+    free: Mapping[str, np.ndarray]
+    reachable: Mapping[str, np.ndarray]
+    blockers: tuple[Blocker, ...]
+    steps: tuple[FixingStep, ...]
+    stop: Stop | None
+    seconds: float
+
+    @property
+    def feasible(self) -> bool:
+        """Whether every item of the order can be added."""
+        return self.stop is None
+
+
+def plan(
+    product: Product, order: tuple[str, ...] | None = None, *, tolerance: float = FIT_TOLERANCE
+) -> FixingPlan:
+    """Decide what is fixed on the jig, and how, in each step of an assembly.
+
+    Args:
+        product: Parts in assembled poses.
+        order: Items in the order of assembly; None for the product's default.
+        tolerance: Interference that does not block a motion [m].
+
+    Raises:
+        UnknownName, BadOrder: The order does not list the product's parts once each.
+        CellError: Parts overlap, or the product cannot be used.
+
+    An order that is well formed but infeasible is an answer, not an error: see ``FixingPlan.stop``.
+    """
+    started = time.perf_counter()
+    order = default_order(product) if order is None else order
+    _check(product, order)
+    solids = cut_threads(product, solids_of(product))
+    check_overlaps(product, solids)
+    contact = contact_matrix(list(solids.values()), product.contact_tolerance)
+    leaving = interference(list(solids.values()), tolerance)
+    steps, stop = configure_fixing(product, order, Geometry(solids, contact, leaving))
+    return FixingPlan(
+        product=product.name,
+        order=order,
+        parts=tuple(product.parts),
+        contact=contact,
+        free=leaving.free,
+        reachable=reachable_matrices(contact, leaving.free),
+        blockers=leaving.blockers,
+        steps=steps,
+        stop=stop,
+        seconds=time.perf_counter() - started,
+    )
+
+
+def _check(product: Product, order: tuple[str, ...]) -> None:
+    if not product.parts:
+        raise CellError(f"Product '{product.name}' has no parts.")
+    if product.up not in DIRECTIONS:
+        raise UnknownName("up axis", product.up, DIRECTIONS)
+    check_order(product, order)

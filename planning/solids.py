@@ -1,0 +1,100 @@
+"""Parts in their assembled poses, as the planner's geometry queries need them."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import fcl
+import manifold3d
+import numpy as np
+
+from cell.errors import BadPart
+from cell.product import Part, Product
+from planning.directions import unit_vector
+
+
+@dataclass(frozen=True, eq=False)
+class Solid:
+    """One part in the product frame A.
+
+    Attributes:
+        name: Of the part.
+        vertices: (n, 3) corners in A [m].
+        faces: (m, 3) indices into vertices, counter-clockwise seen from outside.
+        mass: [kg].
+        p_AoG: (3,) centre of gravity in A [m], of uniform density within the part.
+    """
+
+    name: str
+    vertices: np.ndarray
+    faces: np.ndarray
+    mass: float
+    p_AoG: np.ndarray
+
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """(3,) lower corner of the bounding box in A [m]."""
+        return self.vertices.min(axis=0)
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """(3,) upper corner of the bounding box in A [m]."""
+        return self.vertices.max(axis=0)
+
+    @cached_property
+    def manifold(self) -> manifold3d.Manifold:
+        """The part for boolean operations."""
+        mesh = manifold3d.Mesh64(self.vertices, self.faces.astype(np.uint64))
+        manifold = manifold3d.Manifold(mesh)
+        if manifold.status() != manifold3d.Error.NoError or manifold.is_empty():
+            reason = f"its surface does not bound a solid ({manifold.status().name})"
+            raise BadPart(self.name, reason)
+        return manifold
+
+    @cached_property
+    def proximity(self) -> fcl.CollisionObject:
+        """The part's surface for distance queries."""
+        tree = fcl.BVHModel()
+        tree.beginModel(len(self.vertices), len(self.faces))
+        tree.addSubModel(self.vertices, self.faces)
+        tree.endModel()
+        return fcl.CollisionObject(tree, fcl.Transform())
+
+    def without(self, other: Solid) -> Solid:
+        """Return this part with the other's volume cut out; mass and p_AoG stay."""
+        mesh = (self.manifold - other.manifold).to_mesh64()
+        vertices = np.array(mesh.vert_properties)[:, :3]
+        return Solid(self.name, vertices, np.array(mesh.tri_verts, int), self.mass, self.p_AoG)
+
+
+def solid_of(part: Part) -> Solid:
+    """Place a part's mesh in the product frame."""
+    vertices = part.X_AP.multiply(np.array(part.mesh.vertices, float).T).T
+    p_AoG = part.X_AP.multiply(np.array(part.mesh.center_mass, float))
+    return Solid(part.name, vertices, np.array(part.mesh.faces, int), part.mass, p_AoG.ravel())
+
+
+def solids_of(product: Product) -> dict[str, Solid]:
+    """Place all parts, by name in matrix order."""
+    return {name: solid_of(part) for name, part in product.parts.items()}
+
+
+def boxes_apart(a: Solid, b: Solid, gap: float) -> bool:
+    """Say whether the bounding boxes are further apart than the gap [m] along some axis."""
+    return bool(np.any(a.lower - b.upper > gap) or np.any(b.lower - a.upper > gap))
+
+
+def combined_cog(solids: Mapping[str, Solid], names: Iterable[str]) -> np.ndarray:
+    """Return p_AoG (3,) of several parts [m]: sum(m_i p_i) / sum(m_i), the paper's CoG formula."""
+    chosen = [solids[name] for name in names]
+    return np.average([s.p_AoG for s in chosen], axis=0, weights=[s.mass for s in chosen])
+
+
+def cog_height(solids: Mapping[str, Solid], names: Iterable[str], up: str) -> float:
+    """Return how high the combined CoG is above the lowest point when ``up`` points up [m]."""
+    names = list(names)
+    axis = unit_vector(up)
+    lowest = min(float((solids[name].vertices @ axis).min()) for name in names)
+    return float(combined_cog(solids, names) @ axis) - lowest

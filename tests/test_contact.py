@@ -1,0 +1,130 @@
+"""Contact matrix and overlap checks: touching faces, gaps, containment, overlaps."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_three
+
+from cell.errors import BadPart, CellError
+from cell.product import Product
+from planning.checks import check_overlaps, cut_threads, overlap_depth
+from planning.contact import contact_matrix, surface_gap
+from planning.solids import Solid, cog_height, combined_cog, solids_of
+
+
+def contact(product: Product) -> np.ndarray:
+    return contact_matrix(list(solids_of(product).values()), product.contact_tolerance)
+
+
+def two_blocks(gap: float) -> Product:
+    """Two 20 mm cubes, the second above the first by a gap [mm]."""
+    return product_of(
+        {"low": box((20, 20, 20), (0, 0, 0)), "high": box((20, 20, 20), (3, 4, 20 + gap))}
+    )
+
+
+def test_matrix_is_strictly_upper_triangular():
+    """So that C + C^T, which the paper multiplies with M_j, holds only 0 and 1."""
+    matrix = contact(stack_of_three())
+    np.testing.assert_array_equal(matrix, [[0, 1, 0], [0, 0, 1], [0, 0, 0]])
+
+
+@pytest.mark.parametrize("gap", [0.0, 1e-9, 1e-4, 0.049])
+def test_faces_within_the_tolerance_touch(gap):
+    assert contact(two_blocks(gap))[0, 1] == 1
+
+
+@pytest.mark.parametrize("gap", [0.051, 0.1, 5.0])
+def test_faces_beyond_the_tolerance_do_not(gap):
+    assert contact(two_blocks(gap))[0, 1] == 0
+
+
+def test_gap_is_the_distance_of_the_surfaces():
+    low, high = solids_of(two_blocks(5.0)).values()
+    assert surface_gap(low, high) == pytest.approx(5e-3, abs=1e-12)  # Axis-aligned: rounding only.
+
+
+def test_line_to_line_peg_touches_and_clearance_does_not():
+    """In a hole wider than the peg only the bottom face touches; 5 mm higher nothing does."""
+    assert contact(peg_in_hole())[0, 1] == 1
+    assert contact(peg_in_hole(hole=12))[0, 1] == 1
+    hanging = product_of({"ring": rod(30, 0, 10) - rod(12, -5, 15), "peg": rod(10, -5, 15)})
+    assert contact(hanging)[0, 1] == 0
+
+
+def test_a_part_inside_the_material_of_another_is_in_contact():
+    """Their surfaces are 5 mm apart, so distance alone would miss it."""
+    product = product_of(
+        {"block": box((20, 20, 20), (0, 0, 0)), "seed": box((10, 10, 10), (5, 5, 5))}
+    )
+    assert contact(product)[0, 1] == 1
+
+
+def test_a_part_loose_in_a_cavity_is_not():
+    shell = box((20, 20, 20), (0, 0, 0)) - box((14, 14, 14), (3, 3, 3))
+    assert contact(product_of({"shell": shell, "seed": box((4, 4, 4), (8, 8, 8))}))[0, 1] == 0
+
+
+@pytest.mark.parametrize("depth", [0.06, 1.0])
+def test_overlapping_parts_are_refused_by_name(depth):
+    product = two_blocks(-depth)
+    with pytest.raises(CellError, match="'low' and 'high' overlap by .* mm"):
+        check_overlaps(product, solids_of(product))
+
+
+def test_contained_parts_are_refused():
+    product = product_of(
+        {"block": box((20, 20, 20), (0, 0, 0)), "seed": rod(4, 8, 12).translate([10, 10, 0])}
+    )
+    with pytest.raises(CellError, match="'block' and 'seed'"):
+        check_overlaps(product, solids_of(product))
+
+
+@pytest.mark.parametrize("gap", [0.0, -0.04, 1.0])
+def test_overlap_within_the_tolerance_is_accepted(gap):
+    product = two_blocks(gap)
+    check_overlaps(product, solids_of(product))
+
+
+def test_depth_of_a_thin_layer_is_its_thickness():
+    """2 V / A of a layer 17 x 16 x 0.2 mm: 2 % low for its rim."""
+    low, high = solids_of(two_blocks(-0.2)).values()
+    assert overlap_depth(low, high) == pytest.approx(2e-4, rel=0.03)
+
+
+def test_thread_drawn_at_the_tap_drill_is_cut_for_a_declared_fastener():
+    product = bolted(thread=2.5)
+    solids = cut_threads(product, solids_of(product))
+    check_overlaps(product, solids)
+    assert contact_matrix(list(solids.values()), product.contact_tolerance)[0, 2] == 1
+
+
+def test_a_bolt_far_thicker_than_its_hole_is_refused():
+    """Overlap of 1 mm is no thread of pitch 0.5 mm."""
+    product = bolted(thread=1.0)
+    with pytest.raises(CellError, match="'base' and 'bolt'"):
+        check_overlaps(product, cut_threads(product, solids_of(product)))
+
+
+def test_combined_cog_weighs_by_mass():
+    solids = solids_of(stack_of_three())
+    np.testing.assert_allclose(
+        combined_cog(solids, ["plate_0", "plate_1"]), [0, 0, 0.01], atol=1e-12
+    )
+    assert cog_height(solids, solids, "+z") == pytest.approx(0.015)
+    assert cog_height(solids, ["plate_2"], "-z") == pytest.approx(0.005)
+
+
+def test_a_surface_that_bounds_nothing_is_refused():
+    sheet = Solid("sheet", np.eye(3), np.array([[0, 1, 2]]), 1.0, np.zeros(3))
+    with pytest.raises(BadPart, match="'sheet'"):
+        _ = sheet.manifold
+
+
+def test_solid_survives_a_round_trip_through_the_boolean_library():
+    solid = solids_of(peg_in_hole())["block"]
+    far = Solid("far", solid.vertices + 1.0, solid.faces, 1.0, solid.p_AoG)
+    volume = solid.without(far).manifold.volume()
+    assert volume == pytest.approx(Manifold(solid.manifold.to_mesh64()).volume(), rel=1e-12)

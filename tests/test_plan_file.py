@@ -1,0 +1,128 @@
+"""plan.json, the terminal's text, and the command that writes and prints them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+from tiny_products import (
+    box,
+    interlocked_links,
+    peg_in_hole,
+    product_of,
+    stack_of_three,
+    tube_and_pins,
+)
+
+import experiments.plan_command as plan_command
+from cell.errors import CellError
+from experiments.plan_command import run_plan
+from planning import FixingPlan, load_plan, plan, save_plan
+from planning.directions import DIRECTIONS
+from planning.explain import explanation, stop_text
+from planning.plan_file import plan_to_dict
+
+PRODUCTS = [peg_in_hole, interlocked_links, stack_of_three, tube_and_pins]
+
+
+@pytest.mark.parametrize("make", PRODUCTS)
+def test_a_plan_survives_a_round_trip(make, tmp_path):
+    """Every number and name, feasible or not."""
+    before = plan(make())
+    save_plan(before, tmp_path / "plan.json")
+    after = load_plan(tmp_path / "plan.json")
+    assert plan_to_dict(after) == plan_to_dict(before)
+    assert after.steps == before.steps and after.stop == before.stop
+    assert after.blockers == before.blockers
+    np.testing.assert_array_equal(after.contact, before.contact)
+    assert [file.name for file in tmp_path.iterdir()] == ["plan.json"]
+
+
+def test_file_has_the_agreed_keys(tmp_path):
+    save_plan(plan(tube_and_pins()), tmp_path / "plan.json")
+    data = json.loads((tmp_path / "plan.json").read_text())
+    assert data["parts"] == ["plate", "pin_1", "pin_2"]
+    assert data["contact"] == [[0, 1, 1], [0, 0, 0], [0, 0, 0]]
+    assert list(data["free"]) == list(data["reachable"]) == list(DIRECTIONS)
+    (step,) = data["steps"]
+    assert step["target"] == ["plate"] and step["incoming"] == ["pin_1", "pin_2"]
+    assert step["directions"] == {"+x": 0, "-x": 0, "+y": 0, "-y": 0, "+z": 1, "-z": 1}
+    assert (step["posture"], step["fixed_part"], step["up"]) == ("+z", "plate", "+z")
+    assert step["cog_height_m"] == pytest.approx(5.9e-3, abs=5e-5)
+    assert step["reason"] and data["reading"] and data["seconds"] > 0.0
+
+
+def test_planning_twice_gives_the_same_file_but_for_the_time():
+    first, second = (plan_to_dict(plan(tube_and_pins())) for _ in range(2))
+    assert first | {"seconds": 0} == second | {"seconds": 0}
+
+
+@pytest.mark.parametrize(
+    ("text", "message"), [("[", "not a plan"), ("[]", "not a plan"), ('{"product": "a"}', "lacks")]
+)
+def test_other_files_are_refused(text, message, tmp_path):
+    (tmp_path / "plan.json").write_text(text)
+    with pytest.raises(CellError, match=message):
+        load_plan(tmp_path / "plan.json")
+
+
+def test_a_missing_file_is_refused(tmp_path):
+    with pytest.raises(CellError, match="cannot be read"):
+        load_plan(tmp_path / "plan.json")
+
+
+def test_explanation_names_pair_direction_and_point():
+    fixing = plan(interlocked_links())
+    assert fixing.stop is not None
+    for text in (explanation(fixing), stop_text(fixing.stop)):
+        assert "-x: link_2 hits link_1 at (15.00," in text
+        assert "mm after 15.00 mm" in text
+
+
+def test_explanation_shows_every_matrix():
+    text = explanation(plan(peg_in_hole()))
+    assert all(f"M_{j}:" in text and f"W_{j}:" in text for j in DIRECTIONS)
+    assert "Reading: " in text
+
+
+def run(monkeypatch, capsys, product, folder: Path, **options) -> tuple[int, str, FixingPlan]:
+    """Run the command on a product built in code."""
+    monkeypatch.setattr(plan_command, "load_product", lambda name, units: product)
+    arguments = {"order": None, "units": None, "explain": False} | options
+    code = run_plan("tiny", out=folder, **arguments)
+    return code, capsys.readouterr().out, load_plan(folder / "plan.json")
+
+
+def test_command_writes_and_prints_a_feasible_plan(monkeypatch, capsys, tmp_path):
+    folder = tmp_path / "new" / "folder"
+    code, text, fixing = run(monkeypatch, capsys, peg_in_hole(), folder)
+    assert code == 0 and fixing.feasible
+    assert "+z / block" in text and "peg can leave the target only along +z" in text
+
+
+def test_command_reports_an_infeasible_order_with_exit_1(monkeypatch, capsys, tmp_path):
+    code, text, fixing = run(monkeypatch, capsys, interlocked_links(), tmp_path)
+    assert code == 1 and not fixing.feasible
+    assert "Infeasible: link_2 cannot be added to link_1" in text
+
+
+def test_command_explains_on_request(monkeypatch, capsys, tmp_path):
+    _, text, _ = run(monkeypatch, capsys, peg_in_hole(), tmp_path, explain=True)
+    assert "Interference-free" in text and "peg hits block" in text
+
+
+def test_nothing_is_written_for_bad_input(monkeypatch, capsys, tmp_path):
+    cube = box((10, 10, 10), (0, 0, 0))
+    overlapping = product_of({"a": cube, "b": cube.translate([1, 1, 1])})
+    with pytest.raises(CellError):
+        run(monkeypatch, capsys, overlapping, tmp_path / "new")
+    with pytest.raises(CellError):
+        run(monkeypatch, capsys, peg_in_hole(), tmp_path / "new", order=("peg", "hole"))
+    assert not (tmp_path / "new").exists()
+
+
+def test_command_plans_the_motor_unit(capsys, tmp_path):
+    assert run_plan("motor_unit", ("plate", "bolts", "motor"), None, False, tmp_path) == 0
+    assert "-z / motor" in capsys.readouterr().out
