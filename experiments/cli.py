@@ -1,0 +1,195 @@
+"""The command line: ``soft-jig COMMAND ...``; the typed classes below are its options.
+
+Exit code 0: done and the verdict is success. 1: it ran and the verdict is failure. 2: bad input,
+with one line on stderr that names the culprit and the alternatives.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import tyro
+from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from cell.errors import CellError, UnknownName
+from experiments.output import output_folder
+
+if TYPE_CHECKING:
+    from cell.config import CellConfig
+
+# What a command needs is imported when it runs: Drake takes a second that --help can do without.
+
+
+class BadUsage(CellError):
+    """A command line that cannot be understood."""
+
+
+@dataclass(frozen=True)
+class Common:
+    """Options that every command takes."""
+
+    seed: int = 0
+    """Seed of everything random: the same seed gives the same result, bit for bit."""
+
+    out: Annotated[Path, arg(metavar="DIR")] = Path("out")
+    """Folder for the results; made if it does not exist."""
+
+    config: Annotated[str, arg(metavar="FILE")] = "default"
+    """Configuration: a YAML file (it may be partial), or a name in models/config."""
+
+    overrides: Annotated[
+        UseAppendAction[tuple[str, ...]], arg(name="set", metavar="KEY=VALUE")
+    ] = ()
+    """Change one value of the configuration, for example simulation.time_step=0.002. Repeatable."""
+
+    quiet: bool = False
+    """Print nothing but errors."""
+
+    def load_config(self) -> CellConfig:
+        """Return the configuration that the options describe, checked."""
+        from cell.config import CellConfig
+
+        if self.seed < 0:
+            raise BadUsage(f"--seed must be >= 0, not {self.seed}.")
+        return CellConfig.load(self.config, self.overrides)
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Decide, for each assembly step, which part the jig holds and in which posture."""
+
+    product: Annotated[Positional[str], arg(metavar="PRODUCT")]
+    """A name in models/products, a YAML file, or a folder of meshes in assembled pose."""
+
+    order: Annotated[str | None, arg(metavar="A,B,C")] = None
+    """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
+
+    units: Annotated[str | None, arg(metavar="mm|cm|m|in")] = None
+    """Unit of mesh files; default mm."""
+
+    explain: bool = False
+    """Also print which pair of parts blocks which direction, and where."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``plan.json``; return the exit code."""
+        self.common.load_config()
+        stdout = io.StringIO() if self.common.quiet else sys.stdout
+        with output_folder(self.common.out) as out, contextlib.redirect_stdout(stdout):
+            from experiments.plan_command import run_plan
+
+            return run_plan(self.product, split_order(self.order), self.units, self.explain, out)
+
+
+@dataclass(frozen=True)
+class Assemble:
+    """Plan, then run the whole assembly in the twin, with contact forces."""
+
+    product: Annotated[Positional[str], arg(metavar="PRODUCT")] = "motor_unit"
+    """A name in models/products, or a YAML file."""
+
+    order: Annotated[str | None, arg(metavar="A,B,C")] = None
+    """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
+
+    view: bool = False
+    """Show the run in a browser while it goes on."""
+
+    replay: Annotated[Path | None, arg(metavar="FILE.html")] = None
+    """Write a recording that plays in any browser, offline."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json``, ``log.npz`` and ``report.html``; return the exit code."""
+        config = self.common.load_config()
+        with contextlib.ExitStack() as folders:
+            out = folders.enter_context(output_folder(self.common.out))
+            if self.replay is not None:
+                folders.enter_context(output_folder(self.replay.absolute().parent))
+            from cell.load_product import load_product
+            from experiments.assemble import run_assemble
+
+            return run_assemble(
+                product=load_product(self.product),
+                order=split_order(self.order),
+                config=config,
+                seed=self.common.seed,
+                out=out,
+                view=self.view,
+                replay=self.replay,
+                quiet=self.common.quiet,
+            )
+
+
+DESCRIPTION = """\
+A digital twin of a dual-arm assembly cell with a soft jig.
+Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
+"""
+COMMANDS: dict[str, type[Plan] | type[Assemble]] = {"plan": Plan, "assemble": Assemble}
+
+
+def split_order(text: str | None) -> tuple[str, ...] | None:
+    """Return the items of an order written "a,b,c"; None stays None."""
+    return None if text is None else tuple(item.strip() for item in text.split(","))
+
+
+def parse(arguments: Sequence[str]) -> Plan | Assemble:
+    """Return the command that the arguments describe.
+
+    Raises:
+        BadUsage: Or `UnknownName` for a command that does not exist.
+        SystemExit: With code 0, after printing the help that was asked for.
+    """
+    command = arguments[0] if arguments else ""
+    if not command:
+        raise BadUsage(f"A command is missing. Known: {', '.join(COMMANDS)}. See soft-jig --help.")
+    if command not in COMMANDS and command not in ("-h", "--help"):
+        raise UnknownName("command", command, COMMANDS)
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="soft-jig",
+                description=DESCRIPTION,
+                args=arguments,
+                config=(FlagCreatePairsOff,),
+            )
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+        raise BadUsage(one_line(complaint.getvalue())) from None
+
+
+def one_line(complaint: str) -> str:
+    """Return tyro's complaint as one line: the fault, and the nearest right option.
+
+    Tyro prints sections with rules between: in a box with the title in its border, or, where the
+    terminal has no Unicode, without a box and with the title as the first section.
+    """
+    plain = re.sub(r"\x1b\[[0-9;]*m|[╭╰].*", "", complaint).replace("│", " ")
+    sections = [" ".join(text.split()) for text in re.split(r"^\s*[─-]{3,}\s*$", plain, flags=re.M)]
+    if "╭" not in complaint and len(sections) > 1:
+        sections.pop(0)
+    line = sections[0].removesuffix(" (required)").rstrip(".") + "."
+    for section in sections:
+        if nearest := re.match(r"Perhaps you meant: (\S+)", section):
+            line += f" Did you mean '{nearest[1]}'?"
+    return f"{line} See soft-jig --help."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code."""
+    try:
+        return parse(sys.argv[1:] if arguments is None else arguments).run()
+    except CellError as error:
+        print(f"soft-jig: {error}", file=sys.stderr)
+        return 2
