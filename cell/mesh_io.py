@@ -77,13 +77,15 @@ def check_mesh(mesh: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
         raise BadPart(name, "the mesh has no faces")
     if not (mesh.is_watertight and mesh.is_winding_consistent):
         raise BadPart(name, "the mesh is not watertight")
-    if abs(mesh.volume) < 1e-9 * size**3:
+    with np.errstate(invalid="ignore"):  # The centre of mass of nothing is not a number.
+        volume = float(mesh.volume)
+    if not abs(volume) > 1e-9 * size**3:
         raise BadPart(name, "the mesh encloses no volume")
     if size > LARGEST_PART:
         raise BadPart(name, f"it is {size:.3g} m long, larger than the cell: wrong units?")
     if size < SMALLEST_PART:
         raise BadPart(name, f"it is only {size * 1e6:.3g} micrometres long: wrong units?")
-    if mesh.volume < 0.0:  # A closed surface that faces inwards is common in STL and unambiguous.
+    if volume < 0.0:  # A closed surface that faces inwards is common in STL and unambiguous.
         mesh.invert()
     return mesh
 

@@ -1,6 +1,7 @@
 """The drawn parts have the measured dimensions, and the contact pieces the fits they claim."""
 
 import filecmp
+from collections.abc import Callable
 from functools import reduce
 from operator import add
 from pathlib import Path
@@ -34,7 +35,10 @@ def surfaces(model: Model) -> dict[str, trimesh.Trimesh]:
 @pytest.mark.parametrize("model", [mu.motor_model(), mu.plate_model(), mu.bolt_model()])
 def test_parts_are_closed_solids(model: Model) -> None:
     assert whole(model).is_volume
-    assert all(surface.is_volume for surface in surfaces(model).values())
+    for piece in model.pieces:
+        if isinstance(piece.shape, trimesh.Trimesh):
+            assert piece.shape.is_winding_consistent
+            assert piece.shape.is_volume or not piece.convex  # A rigid surface may be open.
 
 
 def test_motor_agrees_with_the_measured_one() -> None:
@@ -86,15 +90,23 @@ def test_shank_and_threaded_hole_coincide() -> None:
         assert np.linalg.norm(rim[:, :2] - corner, axis=1).min() < 2e-7
 
 
-def test_fits_keep_their_mean_clearance() -> None:
+def test_boss_and_bore_keep_their_mean_clearance() -> None:
     pieces = surfaces(mu.motor_model()) | surfaces(mu.plate_model())
-    axis = np.array([0.0, mu.SHAFT_Y * 1e-3])
-    boss = np.linalg.norm(pieces["boss"].vertices[:, :2] - axis, axis=1).max()
-    bore = np.linalg.norm(pieces["bore"].vertices[:, :2] - axis, axis=1).min()
-    boss_flat, bore_flat = boss * np.cos(np.pi / 48), bore * np.cos(np.pi / 64)
+    boss, boss_flat = radii(pieces["boss"].vertices, max)
+    bore, bore_flat = radii(pieces["bore"].vertices, min)
     clearance = (bore + bore_flat - boss - boss_flat) / 2
     assert clearance == pytest.approx(0.075e-3, abs=1e-9)
     assert bore_flat > boss  # Free in every angular position.
+
+
+def radii(points: np.ndarray, choose: Callable[[np.ndarray], float]) -> tuple[float, float]:
+    """Return the radius of the corners and of the flats of the fit's polygon about the shaft."""
+    xy = points[:, :2] - [0.0, mu.SHAFT_Y * 1e-3]
+    radius = np.linalg.norm(xy, axis=1)
+    corner = choose(radius)
+    angles = np.arctan2(*xy[np.isclose(radius, corner)].T)
+    facets = len(np.unique(np.round(np.cos(angles) + 2 * np.sin(angles), 6)))
+    return corner, corner * float(np.cos(np.pi / facets))
 
 
 def test_can_has_24_flats_and_corners_between_the_axes() -> None:

@@ -38,8 +38,15 @@ PLATE_X, PLATE_Y, PLATE_Z = 70.0, 40.0, 30.0
 
 # Bolts hang by their heads between two rails, 16 mm apart.
 BOLT_Y, BOLT_Z, BOLT_SPACING, RAIL_GAP = -70.0, 24.0, 16.0, 3.7
+RAIL_WIDTH, RIDGE_WIDTH, RIDGE_HEIGHT = (
+    6.0,
+    0.6,
+    4.0,
+)  # Ends inside of the head's rim, even off centre by 0.3.
 
 PLASTIC = Contact(0.5, 1e8, dissipation=5.0)  # [A] printed polymer, stiff against part weights.
+# Pressure rises over half the width of a piece: a thin one needs a lower modulus to be as stiff.
+THIN_PLASTIC = Contact(0.5, 1e7, dissipation=5.0)
 BASE_GREY, NEST_TEAL = (0.22, 0.24, 0.27), (0.10, 0.48, 0.50)
 
 
@@ -85,23 +92,19 @@ def plate_nest() -> list[Piece]:
 
 
 def bolt_nest() -> list[Piece]:
-    """Return two rails; heads overlap each by 0.9 mm."""
-    half_gap, half_length = RAIL_GAP / 2, 2.5 * BOLT_SPACING + 3 * HEAD_RADIUS
-    y, z, width = BOLT_Y, BOLT_Z, 6.0
-    return [
-        box_piece(
-            "bolt_rail_near",
-            (-half_length, y - half_gap - width, 0),
-            (half_length, y - half_gap, z),
-            PLASTIC,
-        ),
-        box_piece(
-            "bolt_rail_far",
-            (-half_length, y + half_gap, 0),
-            (half_length, y + half_gap + width, z),
-            PLASTIC,
-        ),
-    ]
+    """Return two rails with thin ridges under the heads, so that noses pass beside the ridges."""
+    half_length, foot = 2.5 * BOLT_SPACING + 3 * HEAD_RADIUS, BOLT_Z - RIDGE_HEIGHT
+    pieces = []
+    for side, sign in (("near", -1.0), ("far", 1.0)):
+        for name, width, z_low, z_high, contact in (
+            ("rail", RAIL_WIDTH, 0.0, foot, PLASTIC),
+            ("ridge", RIDGE_WIDTH, foot, BOLT_Z, THIN_PLASTIC),
+        ):
+            gap = sign * RAIL_GAP / 2
+            y_low, y_high = sorted((BOLT_Y + gap, BOLT_Y + gap + sign * width))
+            low, high = (-half_length, y_low, z_low), (half_length, y_high, z_high)
+            pieces.append(box_piece(f"bolt_{name}_{side}", low, high, contact))
+    return pieces
 
 
 def _webs() -> list[Look]:

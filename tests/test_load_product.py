@@ -1,0 +1,213 @@
+"""Products at the door: units, soundness, and errors that name culprit and alternatives."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from cell.errors import BadOrder, BadPart, CellError, UnknownName
+from cell.load_product import load_product
+from cell.mesh_io import MESH_SUFFIXES
+
+GOOD = """
+name: pair
+parts:
+  block: {mesh: block.stl, mass_kg: 0.1}
+  peg: {mesh: peg.stl, mass_kg: 0.02, assembled_pose: {xyz_mm: [0, 0, 20], rpy_deg: [0, 0, 90]}}
+orders: [[block, peg]]
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path) -> Path:
+    """Return a folder with a 20 mm cube and a 5 x 5 x 30 mm peg, drawn in millimetres."""
+    trimesh.creation.box((20, 20, 20)).export(tmp_path / "block.stl")
+    trimesh.creation.box((5, 5, 30)).apply_translation([0, 0, 25]).export(tmp_path / "peg.stl")
+    (tmp_path / "notes.txt").write_text("other files are ignored")
+    return tmp_path
+
+
+def write(folder: Path, text: str) -> Path:
+    file = folder / "pair.yaml"
+    file.write_text(text)
+    return file
+
+
+def test_motor_unit_is_complete() -> None:
+    product = load_product("motor_unit")
+    bolts = tuple(f"bolt_{k}" for k in range(1, 7))
+    assert tuple(product.parts) == ("motor", "plate", *bolts)
+    assert product.items() == ("motor", "plate", "bolts")
+    assert product.orders == (("motor", "plate", "bolts"), ("plate", "bolts", "motor"))
+    assert product.members("bolts") == tuple(product.fasteners) == bolts
+    assert (product.up, product.contact_tolerance) == ("+z", pytest.approx(5e-5))
+    for part in product.parts.values():
+        assert part.mesh.is_volume and part.model and part.X_TrayP and part.grasps
+    for k, name in enumerate(bolts):
+        x, y, z = product.parts[name].X_AP.translation()
+        assert np.hypot(x, y) == pytest.approx(15.5e-3)
+        assert np.rad2deg(np.arctan2(y, x)) % 360 == pytest.approx(60 * k, abs=1e-4)
+        assert z == pytest.approx(5e-3)
+
+
+def test_grasps_close_on_the_part() -> None:
+    """Both points at half the width from the jaw's origin, along its x, lie on the surface."""
+    for part in load_product("motor_unit").parts.values():
+        for grasp in part.grasps:
+            ends = [grasp.X_PJaw @ np.array([s * grasp.width / 2, 0, 0]) for s in (-1, 1)]
+            closest = trimesh.proximity.closest_point_naive(part.mesh, np.array(ends))[1]
+            assert np.max(closest) < 2e-5  # Sagitta of the drawn 64 and 96 facets: 7 to 10 um.
+
+
+def test_yaml_reads_units_poses_and_masses(folder: Path) -> None:
+    product = load_product(write(folder, GOOD))
+    peg = product.parts["peg"]
+    assert product.name == "pair"
+    assert peg.mass == 0.02
+    np.testing.assert_allclose(peg.mesh.extents, [5e-3, 5e-3, 30e-3], atol=1e-9)
+    np.testing.assert_allclose(peg.X_AP.translation(), [0, 0, 0.02])
+    np.testing.assert_allclose(peg.X_AP.rotation().matrix()[:, 0], [0, 1, 0], atol=1e-12)
+
+
+@pytest.mark.parametrize(("units", "size"), [(None, 0.02), ("mm", 0.02), ("cm", 0.2)])
+def test_folder_is_a_product_in_assembled_pose(
+    folder: Path, units: str | None, size: float
+) -> None:
+    product = load_product(folder, units=units)
+    assert list(product.parts) == ["block", "peg"]
+    np.testing.assert_allclose(product.parts["block"].mesh.extents, [size] * 3)
+    assert product.parts["peg"].mesh.centroid[2] == pytest.approx(25 / 20 * size)
+    assert product.orders == () and product.groups == {}
+
+
+@pytest.mark.parametrize("suffix", MESH_SUFFIXES)
+def test_every_supported_type_is_read(tmp_path: Path, suffix: str) -> None:
+    """GLB is in metres by its specification, the others are taken as millimetres."""
+    scale = 1e-3 if suffix == ".glb" else 1.0
+    cube = trimesh.creation.box((20 * scale,) * 3)
+    cube.export(tmp_path / f"cube{suffix}")
+    part = load_product(tmp_path).parts["cube"]
+    assert part.mesh.is_volume
+    np.testing.assert_allclose(part.mesh.extents, [0.02] * 3, rtol=1e-6)
+
+
+def test_inward_surface_is_turned_outwards(tmp_path: Path) -> None:
+    cube = trimesh.creation.box((20, 20, 20))
+    cube.invert()
+    cube.export(tmp_path / "cube.ply")
+    assert load_product(tmp_path).parts["cube"].mesh.volume == pytest.approx(8e-6)
+
+
+def test_unknown_product_names_the_nearest() -> None:
+    with pytest.raises(UnknownName, match="Did you mean 'motor_unit'"):
+        load_product("motor_unti")
+
+
+def test_unsupported_input_lists_what_is(folder: Path) -> None:
+    (folder / "pair.step").write_text("ISO-10303-21;")
+    with pytest.raises(CellError, match=r"not a product; supported: .*yaml.*folder of meshes"):
+        load_product(folder / "pair.step")
+    with pytest.raises(CellError, match="does not exist"):
+        load_product(folder / "nowhere" / "thing.step")
+
+
+def test_unknown_unit_lists_the_known(folder: Path) -> None:
+    with pytest.raises(UnknownName, match="No unit 'mn'.*cm, in, m, mm"):
+        load_product(folder, units="mn")
+    with pytest.raises(CellError, match="states its own units"):
+        load_product(write(folder, GOOD), units="cm")
+
+
+@pytest.mark.parametrize(
+    ("units", "message"), [("m", "block.*larger than the cell: wrong units"), ("in", None)]
+)
+def test_implausible_size_is_refused(folder: Path, units: str, message: str | None) -> None:
+    if message is None:
+        assert load_product(folder, units=units).parts["block"].mesh.extents[0] < 1.0
+        return
+    with pytest.raises(BadPart, match=message):
+        load_product(folder, units=units)
+
+
+def test_tiny_part_is_refused(tmp_path: Path) -> None:
+    trimesh.creation.box((0.02,) * 3).export(tmp_path / "cube.stl")
+    with pytest.raises(BadPart, match="cube.*micrometres.*wrong units"):
+        load_product(tmp_path)
+    assert load_product(tmp_path, units="m")
+
+
+def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
+    cube = trimesh.creation.box((20, 20, 20))
+    hole = trimesh.Trimesh(cube.vertices, cube.faces[:-1])
+    flat = trimesh.Trimesh(
+        [[0, 0, 0], [10, 0, 0], [0, 10, 0]], [[0, 1, 2], [0, 2, 1]], process=False
+    )
+    for mesh, reason in [(hole, "not watertight"), (flat, "no volume|not watertight")]:
+        mesh.export(tmp_path / "part.obj")
+        with pytest.raises(BadPart, match=f"'part'.*({reason})"):
+            load_product(tmp_path)
+    (tmp_path / "part.obj").write_text("v 0 0\nf nonsense\n")
+    with pytest.raises(BadPart, match="'part'"):
+        load_product(tmp_path)
+
+
+def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -> None:
+    trimesh.creation.box((5, 5, 5)).export(folder / "peg.obj")
+    with pytest.raises(BadPart, match="'peg'.*two files"):
+        load_product(folder)
+    empty = tmp_path / "empty"
+    empty.mkdir()
+    with pytest.raises(CellError, match="no mesh; supported: .obj"):
+        load_product(empty)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "message"),
+    [
+        ("mass_kg: 0.1", "mass_kg: -0.1", "'block'.*mass"),
+        ("mass_kg: 0.1", "mass_kg: 0", "'block'.*mass"),
+        ("mass_kg: 0.1", "mass_kg: heavy", "'block'.*mass"),
+        ("mass_kg: 0.1", "mas_kg: 0.1", "parts.block.*Did you mean 'mass_kg'"),
+        ("mesh: block.stl, ", "", "'block'.*'model' or a 'mesh'"),
+        ("mesh: block.stl", "mesh: blok.stl", "'block'.*no mesh file"),
+        ("mesh: block.stl, mass_kg: 0.1", "model: moter", "No model 'moter'.*'motor'"),
+        ("mesh: block.stl", "model: motor, mesh: block.stl", "'block'.*either"),
+        ("mesh: block.stl", "model: motor", "'block'.*remove 'mass_kg'"),
+        ("peg: {mesh", "block: {mesh", "'block' occurs twice"),
+        ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 20]", "assembled_pose.xyz_mm.*three numbers"),
+        ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 0, 20000]", "outside of the cell"),
+        ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 0, .nan]", "expected a number"),
+        ("name: pair", "name: pair\nup: up", "No axis 'up'"),
+        ("name: pair", "name: pair\nunits: furlong", "No unit 'furlong'"),
+        ("name: pair", "name: pair\ncolour: red", "called 'colour'"),
+        ("name: pair", "name: [pair", "not valid YAML"),
+        ("parts:", "groups: {both: [block, pegg]}\nparts:", "No part 'pegg'.*'peg'"),
+        ("parts:", "groups: {peg: [block]}\nparts:", "both a part and a group"),
+        ("parts:", "groups: {a: [peg], b: [peg]}\nparts:", "'peg' is in 'a' and 'b'"),
+    ],
+)
+def test_malformed_product_is_refused(folder: Path, old: str, new: str, message: str) -> None:
+    assert old in GOOD
+    with pytest.raises(CellError, match=message):
+        load_product(write(folder, GOOD.replace(old, new, 1)))
+
+
+@pytest.mark.parametrize("order", ["[block]", "[block, peg, peg]"])
+def test_order_lists_every_part_once(folder: Path, order: str) -> None:
+    with pytest.raises(BadOrder, match="block, peg"):
+        load_product(write(folder, GOOD.replace("[[block, peg]]", f"[{order}]")))
+
+
+def test_malformed_grasp_is_refused(folder: Path) -> None:
+    grasp = (
+        "grasps: [{name: a, jaw: tip, at_mm: [0, 0, 0], closing: [1, 0, 0], "
+        "approach: [1, 0, 1], width_mm: 5, force_N: 4}]"
+    )
+    text = GOOD.replace("mass_kg: 0.1", f"mass_kg: 0.1, {grasp}")
+    with pytest.raises(CellError, match="block.grasps.0.*not perpendicular"):
+        load_product(write(folder, text))
+    with pytest.raises(UnknownName, match="No jaw 'tipp'"):
+        load_product(write(folder, text.replace("jaw: tip", "jaw: tipp")))
+    good = text.replace("approach: [1, 0, 1]", "approach: [0, 0, 1]")
+    assert load_product(write(folder, good)).parts["block"].grasps[0].force == 4.0
