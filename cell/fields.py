@@ -72,9 +72,19 @@ def names_at(value: Any, where: str) -> tuple[str, ...]:
     return tuple(value)
 
 
+def one_of(kind: str, name: str, known: Sequence[str]) -> str:
+    """Return the name if it is known."""
+    if name not in known:
+        raise UnknownName(kind, name, known)
+    return name
+
+
 def _mapping(value: Any, where: str) -> Mapping[str, Any]:
     if not isinstance(value, Mapping):
         raise CellError(f"{where}: expected keys with values, got {value!r}.")
+    for key in value:
+        if not isinstance(key, str):
+            raise CellError(f"{where}: the key {key!r} is not a name; put it in quotes.")
     return value
 
 
