@@ -30,25 +30,31 @@ def overlap_depth(a: Solid, b: Solid) -> float:
     return max((2.0 * p.volume() / p.surface_area() for p in pieces if p.volume() > 0.0), default=0)
 
 
-def cut_threads(product: Product, solids: Mapping[str, Solid]) -> dict[str, Solid]:
-    """Return the solids with each declared bolt's thread cut out of the part it is driven into."""
-    cut = dict(solids)
-    for fastener in product.fasteners.values():
-        bolt, nut = cut[fastener.part], cut[fastener.into]
-        depth = overlap_depth(bolt, nut)
-        thread_height = THREAD_HEIGHT_PER_PITCH * fastener.pitch
-        if product.contact_tolerance < depth <= thread_height + product.contact_tolerance:
-            cut[fastener.into] = nut.without(bolt)
-    return cut
+def without_overlaps(product: Product, solids: Mapping[str, Solid]) -> dict[str, Solid]:
+    """Return the solids with each declared bolt's thread cut out of the part it is driven into.
 
-
-def check_overlaps(product: Product, solids: Mapping[str, Solid]) -> None:
-    """Refuse two parts that share a layer thicker than the contact tolerance."""
-    for a, b in combinations(solids.values(), 2):
-        depth = overlap_depth(a, b)
-        if depth > product.contact_tolerance:
+    Raises:
+        CellError: Two parts share a layer thicker than the contact tolerance, and it is no thread.
+    """
+    fitted = dict(solids)
+    for a, b in combinations(solids, 2):
+        depth = overlap_depth(solids[a], solids[b])
+        if depth <= product.contact_tolerance:
+            continue
+        bolt, nut = (a, b) if a in product.fasteners else (b, a)
+        if depth > _thread_height(product, bolt, nut) + product.contact_tolerance:
             raise CellError(
-                f"Parts '{a.name}' and '{b.name}' overlap by {1e3 * depth:.3g} mm, more than the "
+                f"Parts '{a}' and '{b}' overlap by {1e3 * depth:.3g} mm, more than the "
                 f"contact tolerance of {1e3 * product.contact_tolerance:.3g} mm: correct their "
                 "poses or shapes, declare a fastener if it is a thread, or raise the tolerance."
             )
+        fitted[nut] = fitted[nut].without(solids[bolt])
+    return fitted
+
+
+def _thread_height(product: Product, bolt: str, nut: str) -> float:
+    """Return how deep a bolt's thread reaches into a part [m]; 0 if it is not driven into it."""
+    fastener = product.fasteners.get(bolt)
+    if fastener is None or fastener.into != nut:
+        return 0.0
+    return THREAD_HEIGHT_PER_PITCH * fastener.pitch

@@ -28,22 +28,22 @@ class Polygons:
         Args:
             signed: (n, k) value of each polygon's linear function at its corners.
         """
-        k = self.corners.shape[1]
-        column = np.arange(k)
+        n, k = signed.shape
+        row, column = np.arange(n)[:, None], np.arange(k)
         valid = column < self.count[:, None]
         following = np.where(column + 1 < self.count[:, None], column + 1, 0)
-        signed_next = np.take_along_axis(signed, following, 1)
-        corners_next = np.take_along_axis(self.corners, following[:, :, None], 1)
+        signed_next = signed[row, following]
+        corners_next = self.corners[row, following]
         kept = valid & (signed >= 0.0)
         crossed = valid & ((signed >= 0.0) != (signed_next >= 0.0))
         share = np.divide(signed, signed - signed_next, out=np.zeros_like(signed), where=crossed)
         crossings = self.corners + share[:, :, None] * (corners_next - self.corners)
         # Each corner is followed by the crossing on its edge; dropping the unused slots leaves the
         # clipped outline in order. Clipping a convex polygon adds at most one corner.
-        corners = np.stack([self.corners, crossings], axis=2).reshape(len(signed), 2 * k, 2)
-        used = np.stack([kept, crossed], axis=2).reshape(len(signed), 2 * k)
+        corners = np.stack([self.corners, crossings], axis=2).reshape(n, 2 * k, 2)
+        used = np.stack([kept, crossed], axis=2).reshape(n, 2 * k)
         order = np.argsort(~used, axis=1, kind="stable")[:, : k + 1]
-        return Polygons(np.take_along_axis(corners, order[:, :, None], 1), used.sum(axis=1))
+        return Polygons(corners[row, order], used.sum(axis=1))
 
     def closed(self) -> np.ndarray:
         """Return the corners with the padding collapsed onto the first one, (n, k, 2)."""

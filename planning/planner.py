@@ -10,7 +10,7 @@ import numpy as np
 
 from cell.errors import CellError, UnknownName
 from cell.product import Product
-from planning.checks import check_overlaps, cut_threads
+from planning.checks import without_overlaps
 from planning.contact import contact_matrix
 from planning.directions import DIRECTIONS
 from planning.fixing import FixingStep, Geometry, Stop, configure_fixing
@@ -73,8 +73,7 @@ def plan(
     started = time.perf_counter()
     order = default_order(product) if order is None else order
     _check(product, order)
-    solids = cut_threads(product, solids_of(product))
-    check_overlaps(product, solids)
+    solids = without_overlaps(product, solids_of(product))
     contact = contact_matrix(list(solids.values()), product.contact_tolerance)
     leaving = interference(list(solids.values()), tolerance)
     steps, stop = configure_fixing(product, order, Geometry(solids, contact, leaving))

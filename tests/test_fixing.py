@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 
 import pytest
@@ -63,7 +64,10 @@ def test_motor_unit_parts_touch_where_they_should(motor_unit):
 
 
 def test_motor_unit_plans_in_under_a_second(motor_unit):
-    assert plan(motor_unit).seconds < 1.0
+    """CPU time, so that a busy machine does not decide; the aim is 0.2 s, 1 s the limit."""
+    started = time.process_time()
+    plan(motor_unit)
+    assert time.process_time() - started < 1.0
 
 
 def test_plate_cannot_be_added_after_the_bolts(motor_unit):

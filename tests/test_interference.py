@@ -100,6 +100,13 @@ def test_sliding_faces_do_not_block():
     assert leaves(stack_of_three(), "plate_2", "plate_0") == ["+x", "-x", "+y", "-y", "+z"]
 
 
+@pytest.mark.parametrize(("depth", "ways"), [(0.04, ["+x", "-x", "+y", "-y", "+z"]), (0.2, [])])
+def test_faces_sunk_into_each_other_within_the_tolerance_do_not_block(depth, ways):
+    """A cube 0.04 mm deep in a plate is a rounding of CAD; 0.2 mm is an obstacle."""
+    plate, cube = box((60, 60, 10), (-30, -30, 0)), box((10, 10, 10), (-5, -5, 10 - depth))
+    assert leaves(product_of({"plate": plate, "cube": cube}), "cube", "plate") == ways
+
+
 def test_a_part_far_away_blocks_too():
     """Motion is to infinity: a wall 1 m away is in the way, and the travel says how far."""
     product = product_of(
