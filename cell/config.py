@@ -43,8 +43,8 @@ class ArmConfig:
     p_WB: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "m", "Base origin in W [A].")
     rpy_deg: tuple[float, float, float] = setting((0.0, 0.0, 0.0), "deg", "Base in W [A].")
     home_deg: tuple[float, ...] = setting(
-        (0.0, -110.0, 110.0, -90.0, -90.0, 0.0), "deg",
-        "Joint angles to wait in, base to flange: forearm level, tool down [A].",
+        (0.0, -110.0, 100.0, -80.0, -90.0, 0.0), "deg",
+        "Joint angles to wait in, base to flange: forearm 10 deg up, tool down [A].",
         at_least=-360.0, at_most=360.0,
     )  # fmt: skip
     stiffness: tuple[float, ...] = setting(
@@ -184,7 +184,7 @@ class CellConfig:
 
     simulation: SimulationConfig = SimulationConfig()
     left_arm: ArmConfig = ArmConfig(
-        p_WB=(-0.55, 0.0, 0.0), home_deg=(180.0, -110.0, 110.0, -90.0, -90.0, 0.0)
+        p_WB=(-0.55, 0.0, 0.0), home_deg=(180.0, -110.0, 100.0, -80.0, -90.0, 0.0)
     )
     right_arm: ArmConfig = ArmConfig(p_WB=(0.55, 0.0, 0.0))
     workcell: WorkcellConfig = WorkcellConfig()

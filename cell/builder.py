@@ -1,0 +1,170 @@
+"""Build the cell: two arms with tools, soft jig on a force plate, tray and parts, in one plant."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+from pydrake.geometry import SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
+from pydrake.multibody.tree import RigidBody, WeldJoint
+from pydrake.systems.framework import Diagram, DiagramBuilder
+
+from cell.arm import Arm, Drive, add_arm
+from cell.config import CellConfig
+from cell.parts import Parts, add_parts
+from cell.paths import model_url, new_parser
+from cell.product import Product
+from cell.sensors import WrenchSensor
+from cell.soft_jig import SoftJig
+from cell.thread import Thread, add_thread
+from cell.tools import Driver, Gripper, connect_driver, connect_gripper, set_tool_gains
+
+# The jaws wait this far open [m]: wide enough for the motor, narrow enough to see that they move.
+JAW_REST = 0.045
+
+
+@dataclass(frozen=True)
+class Cell:
+    """Handles to a built cell. Holding it keeps everything alive that a simulation needs.
+
+    Attributes:
+        config: What it was built from.
+        product: The product whose parts are in it.
+        plant, scene_graph: Plain Drake.
+        left, right: The arms; the left one carries the gripper, the right one the driver.
+        drives: Inputs of each arm, by arm name.
+        gripper, driver: The tools.
+        soft_jig: The jig.
+        parts: The loose parts.
+        threads: By the name of the bolt.
+        wrists: Wrist wrench sensors, by arm name.
+        force_plate: Wrench sensor under the jig.
+        diagram: The built diagram; None until the caller of `add_cell` has built theirs.
+    """
+
+    config: CellConfig
+    product: Product
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    left: Arm
+    right: Arm
+    drives: Mapping[str, Drive]
+    gripper: Gripper
+    driver: Driver
+    soft_jig: SoftJig
+    parts: Parts
+    threads: Mapping[str, Thread]
+    wrists: Mapping[str, WrenchSensor]
+    force_plate: WrenchSensor
+    diagram: Diagram | None = None
+
+    @property
+    def arms(self) -> Mapping[str, Arm]:
+        """The arms by name."""
+        return {"left": self.left, "right": self.right}
+
+    @property
+    def X_WJ(self) -> RigidTransform:
+        """Pose of the jig frame while the base is bolted to the force plate."""
+        return self.config.workcell.X_WJ
+
+
+def build_cell(config: CellConfig, product: Product) -> Cell:
+    """Build the simulated cell for one product, as a diagram of its own."""
+    builder = DiagramBuilder()
+    cell = add_cell(builder, config, product)
+    return replace(cell, diagram=builder.Build())
+
+
+def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> Cell:
+    """Add the cell to a caller's diagram; with nothing else connected the arms hold."""
+    plant, scene_graph = AddMultibodyPlant(_plant_config(config), builder)
+    plate_weld, jig_base = add_workcell(plant, config, product)
+    left = add_arm(plant, "left", "hand_e", config.left_arm)
+    right = add_arm(plant, "right", "screwdriver", config.right_arm)
+    set_tool_gains(plant, left.tool, right.tool)
+    parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
+    threads = add_threads(plant, scene_graph, product, parts, right)
+    soft_jig = SoftJig.add(plant, scene_graph, jig_base, config.jig)
+    plant.Finalize()
+    drives = {
+        arm.name: Drive.connect(builder, plant, arm.instance, arm.home) for arm in (left, right)
+    }
+    gripper = connect_gripper(builder, plant, left.tool, JAW_REST)
+    driver = connect_driver(builder, plant, right.tool)
+    wrists = {arm.name: WrenchSensor(plant, arm.wrist) for arm in (left, right)}
+    force_plate = WrenchSensor(plant, plate_weld)
+    return Cell(
+        config=config,
+        product=product,
+        plant=plant,
+        scene_graph=scene_graph,
+        left=left,
+        right=right,
+        drives=drives,
+        gripper=gripper,
+        driver=driver,
+        soft_jig=soft_jig,
+        parts=parts,
+        threads=threads,
+        wrists=wrists,
+        force_plate=force_plate,
+    )
+
+
+def _plant_config(config: CellConfig) -> MultibodyPlantConfig:
+    return MultibodyPlantConfig(
+        time_step=config.simulation.time_step,
+        discrete_contact_approximation=config.simulation.contact_approximation,
+        contact_model="hydroelastic_with_fallback",
+    )
+
+
+def add_workcell(
+    plant: MultibodyPlant, config: CellConfig, product: Product
+) -> tuple[WeldJoint, RigidBody]:
+    """Add table, riser, force plate, jig base and tray.
+
+    Returns:
+        The weld between force plate and jig base (where the force plate reads), and the jig base.
+    """
+    X_WJ = config.workcell.X_WJ
+    _add_static(plant, "table", RigidTransform())
+    _add_static(plant, "riser", X_WJ)
+    force_plate = _add_static(plant, "force_plate", X_WJ)
+    (instance,) = new_parser(plant).AddModelsFromUrl(model_url("jig_base"))
+    jig_base = plant.GetBodyByName("jig_base", instance)
+    weld = plant.WeldFrames(force_plate.body_frame(), jig_base.body_frame())
+    if product.tray is not None:
+        _add_static(plant, product.tray, config.workcell.X_WT)
+    return weld, jig_base
+
+
+def _add_static(plant: MultibodyPlant, model: str, X_WM: RigidTransform) -> RigidBody:
+    """Add a one-body model, welded: contact with ``world_body()`` itself crashes some plants."""
+    (instance,) = new_parser(plant).AddModelsFromUrl(model_url(model))
+    body = plant.get_body(plant.GetBodyIndices(instance)[0])
+    plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WM)
+    return body
+
+
+def add_threads(
+    plant: MultibodyPlant, scene_graph: SceneGraph, product: Product, parts: Parts, driver: Arm
+) -> dict[str, Thread]:
+    """Add the tapped hole and the open ties of every fastener of the product."""
+    plant.AddModelInstance("threads")
+    threads = {}
+    for name, fastener in product.fasteners.items():
+        X_AI = product.parts[fastener.into].X_AP
+        threads[name] = add_thread(
+            plant,
+            scene_graph,
+            fastener,
+            bolt=parts[name].body,
+            into=parts[fastener.into].body,
+            X_IH=X_AI.inverse() @ product.parts[name].X_AP,
+            bit_frame=driver.frame("bit_tip"),
+        )
+    return threads

@@ -1,0 +1,35 @@
+"""The record of a run: deterministic arrays, sampled at a fixed period."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+
+class Log:
+    """Rows of named values, and the phases they belong to.
+
+    Attributes:
+        phases: (name, start time) of every phase, in order.
+    """
+
+    def __init__(self) -> None:
+        self._rows: dict[str, list[np.ndarray]] = {}
+        self.phases: list[tuple[str, float]] = []
+
+    def append(self, **values: np.ndarray | float) -> None:
+        """Add one row; every row must have the same names."""
+        for name, value in values.items():
+            self._rows.setdefault(name, []).append(np.array(value, dtype=float))
+
+    def arrays(self) -> dict[str, np.ndarray]:
+        """Return every column as an array (rows first), and the phases as two arrays."""
+        columns = {name: np.array(rows) for name, rows in self._rows.items()}
+        columns["phase_name"] = np.array([name for name, _ in self.phases])
+        columns["phase_start"] = np.array([start for _, start in self.phases])
+        return columns
+
+    def save(self, path: Path) -> None:
+        """Write all columns as a compressed npz."""
+        np.savez_compressed(path, **self.arrays())

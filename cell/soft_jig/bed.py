@@ -1,0 +1,288 @@
+"""The bed of beads while soft: a height field that yields under pressure and keeps its imprint.
+
+An explicit plastic Winkler bed. Every cell carries an elastic spring in series with a plastic
+slider: contact pressure p = k * penetration up to the yield pressure
+
+    q_y = (p_membrane + p_gravity + p_vacuum) tan(phi) Nc + gamma Nq depth + T curvature,
+
+a bearing capacity with the membrane's tension T, which grows with its stretch (Terzaghi's form).
+Beyond q_y the surface sinks for good, and the displaced volume rises as a collar around the
+contact. Stretch hardening matters: with constant q_y a punch runs away through the bed.
+
+Anything with the methods `inflate`, `press`, `settle`, `jam`, `unjam`, `height_at`, `state` and
+`restore` can take this model's place in `SoftJig`. All quantities are in the jig frame J: z = 0 is
+the top of the base plate.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy import ndimage
+
+from cell.soft_jig.parameters import BagParameters, SoilParameters
+from cell.soft_jig.samples import SurfaceSamples, Underside
+
+Array = NDArray[np.float64]
+Contact = tuple[NDArray[np.int64], Array]
+
+# Rotation after which the visible underside of a part is selected anew [rad]: the selection only
+# decides which points stand for the surface, one per cell, so a fraction of a cell does not matter.
+RESELECT_ANGLE = 0.01
+_SCALARS = (
+    "vacuum",
+    "displaced",
+    "absorbed",
+    "stretch",
+    "tension",
+    "_since_settled",
+)
+
+
+class Bed:
+    """Height field over the aperture, with its plastic, elastic and frictional state.
+
+    Attributes:
+        heights: (n, n) plastic surface [m], 0 outside the aperture.
+        active: (n, n) bool, cells inside the aperture.
+        axis: (n,) coordinates of the cell centres along x and y [m].
+        vacuum: Confining pressure from the pump [Pa]; set by the owner.
+    """
+
+    def __init__(self, bag: BagParameters, soil: SoilParameters) -> None:
+        self.bag, self.soil = bag, soil
+        half = int(np.ceil(bag.aperture_radius / bag.cell))
+        self.axis = np.arange(-half, half + 1) * bag.cell
+        self.x, self.y = np.meshgrid(self.axis, self.axis, indexing="ij")
+        self._dome = self._cap(np.hypot(self.x, self.y))
+        self.active = self._dome > 0
+        self._rest_area = self._membrane_area(self._dome)
+        self.vacuum = 0.0
+        self.inflate()
+
+    def _cap(self, radius: Array) -> Array:
+        inside = np.maximum(self.bag.cap_radius**2 - radius**2, 0.0)
+        return np.maximum(np.sqrt(inside) - (self.bag.cap_radius - self.bag.cap_height), 0.0)
+
+    def inflate(self) -> None:
+        """Blow the bag up: the bare cap again, every imprint gone."""
+        self.heights = self._dome.copy()
+        self._shrinkage = np.zeros_like(self.heights)
+        self.displaced = 0.0  # Volume waiting to rise as a collar [m3].
+        self.absorbed = 0.0  # Volume taken up by packing slack [m3].
+        self._traction = np.zeros((self.heights.size, 2))
+        self._reference: dict[str, Array] = {}  # Orientation at which an underside was selected.
+        self._undersides: dict[str, Underside] = {}
+        self._ceilings: dict[str, Contact] = {}  # Undersides over the bed in the latest step.
+        self._step_done = False
+        self._since_settled = 0.0
+        self._update_yield()
+
+    @property
+    def volume(self) -> float:
+        """Volume under the surface, with what is displaced but has not risen yet [m3]."""
+        return float(self.heights.sum() * self.bag.cell**2 + self.displaced)
+
+    def height_at(self, xy: Array) -> Array:
+        """Return the surface height at (k, 2) points, bilinear [m]."""
+        index = (np.asarray(xy, dtype=float) - self.axis[0]) / self.bag.cell
+        return ndimage.map_coordinates(self.heights, index.T, order=1, mode="nearest")
+
+    # Pressing.
+
+    def press(
+        self, X_JP: tuple[Array, Array], V_JP: tuple[Array, Array], samples: SurfaceSamples, dt: float
+    ) -> tuple[Array, Array]:
+        """Push a part into the bed for one step.
+
+        Args:
+            X_JP: Rotation matrix (3, 3) and position (3,) [m] of the part.
+            V_JP: Angular (3,) [rad/s] and linear (3,) [m/s] velocity of the part's origin.
+            samples: The part's surface.
+            dt: Step [s].
+
+        Returns:
+            Force (3,) [N] on the part and torque (3,) [N m] about its origin, in J.
+        """
+        if self._step_done:
+            self._ceilings.clear()
+            self._step_done = False
+        p_PQ_J, z, areas, cells = self._points_over_bed(X_JP, samples)
+        self._ceilings[samples.name] = (cells, z)
+        touching = np.flatnonzero(z < self.heights.reshape(-1)[cells])
+        if len(touching) == 0:
+            return np.zeros(3), np.zeros(3)
+        arm, area, cells = p_PQ_J[touching], areas[touching], cells[touching]
+        velocity = V_JP[1] + arm @ _cross_matrix(V_JP[0]).T
+        pressure = self._sink(cells, z[touching], velocity[:, 2], dt)
+        traction = self._drag(cells, pressure, velocity[:, :2], dt)
+        force = np.column_stack([traction, pressure]) * area[:, None]
+        moment = arm.T @ force
+        torque = np.array([moment[k - 2, k - 1] - moment[k - 1, k - 2] for k in range(3)])
+        return force.sum(axis=0), torque
+
+    def _points_over_bed(
+        self, X_JP: tuple[Array, Array], samples: SurfaceSamples
+    ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
+        """Return the underside's arms (m, 3), heights over cell centres, areas and cell numbers (m,)."""
+        R_JP, p_JP = X_JP
+        under = self._underside(R_JP, samples)
+        p_PQ_J = under.points @ R_JP.T
+        n = len(self.axis)
+        # One whole-cell shift for the part: its bins then cover the cells without gap or overlap.
+        shift = np.rint((p_JP[:2] - self.axis[0]) / self.bag.cell + 0.5)
+        # The border of the grid lies outside the aperture, so clipping drops points, not moves them.
+        column = np.clip(under.bins + shift, 0, n - 1).astype(np.int64)
+        flat = column[:, 0] * n + column[:, 1]
+        keep = np.flatnonzero(self.active.reshape(-1)[flat])
+        to_center = self.axis[0] + column * self.bag.cell - p_JP[:2] - p_PQ_J[:, :2]
+        z = p_PQ_J[:, 2] + p_JP[2] + np.einsum("ij,ij->i", under.slopes, to_center)
+        return p_PQ_J[keep], z[keep], under.areas[keep], flat[keep]
+
+    def _underside(self, R_JP: Array, samples: SurfaceSamples) -> Underside:
+        name = samples.name
+        reference = self._reference.get(name)
+        if reference is None or np.sum(reference * R_JP) < 1 + 2 * np.cos(RESELECT_ANGLE):
+            self._reference[name] = reference = R_JP.copy()
+            self._undersides.pop(name, None)
+        if name not in self._undersides:
+            self._undersides[name] = samples.underside(reference, self.bag.cell)
+        return self._undersides[name]
+
+    def _sink(self, cells: NDArray[np.int64], z: Array, speed: Array, dt: float) -> Array:
+        """Return the contact pressure per point [Pa] and lower the cells that yield."""
+        soil, heights = self.soil, self.heights.reshape(-1)
+        trial = heights[cells] - z
+        limit = self.yield_pressure.reshape(-1)[cells]
+        # Backward Euler on the viscous overstress: stable for any viscosity and step.
+        relaxed = (trial + dt * limit / soil.viscosity) / (1 + dt * soil.stiffness / soil.viscosity)
+        elastic = np.where(soil.stiffness * trial > limit, relaxed, trial)
+        before = heights.sum()
+        np.minimum.at(heights, cells, z + elastic)
+        self.displaced += float(before - heights.sum()) * self.bag.cell**2
+        return np.maximum(soil.stiffness * elastic - soil.damping * speed, 0.0)
+
+    def _drag(self, cells: NDArray[np.int64], pressure: Array, slip: Array, dt: float) -> Array:
+        """Return the membrane's friction per point (m, 2) [Pa]: a spring that slips (Coulomb)."""
+        trial = self._traction[cells] - self.soil.shear_stiffness * dt * slip
+        size = np.sqrt(np.einsum("ij,ij->i", trial, trial))
+        limit = self.soil.surface_friction * pressure
+        trial *= np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
+        self._traction[:] = 0.0  # A cell that lost contact forgets its traction.
+        self._traction[cells] = trial
+        return trial
+
+    # The slow part: collar, stretch, yield pressure.
+
+    def settle(self, dt: float) -> None:
+        """Advance the clock; every `settle_period` raise the collar and update the yield pressure."""
+        self._step_done = True
+        self._since_settled += dt
+        if self._since_settled < self.soil.settle_period - dt / 2:
+            return
+        self._since_settled = 0.0
+        if self.displaced > 0:
+            self._take_up_slack()
+            self._raise_collar()
+        self._update_yield()
+
+    def _take_up_slack(self) -> None:
+        taken = min(self.displaced, self.soil.packing_slack - self.absorbed)
+        self.absorbed += taken
+        self.displaced -= taken
+
+    def _ceiling(self) -> Array:
+        ceiling = np.full(self.heights.size, np.inf)
+        for flat, z in self._ceilings.values():
+            np.minimum.at(ceiling, flat, z)
+        return ceiling.reshape(self.heights.shape)
+
+    def _raise_collar(self) -> None:
+        """Spread the displaced volume around the contact, below whatever hangs over the bed."""
+        ceiling = self._ceiling()
+        touched = ceiling <= self.heights
+        if not touched.any():
+            return
+        distance = ndimage.distance_transform_edt(~touched) * self.bag.cell
+        free = ~touched & (self._dome > self.bag.floor)
+        weight = np.where(free, np.exp(-distance / self.soil.collar_length), 0.0)
+        for _ in range(4):
+            if self.displaced <= 1e-15 or not weight.any():
+                return
+            rise = weight * (self.displaced / (weight.sum() * self.bag.cell**2))
+            raised = np.minimum(self.heights + rise, np.maximum(ceiling, self.heights))
+            self.displaced -= float((raised - self.heights).sum()) * self.bag.cell**2
+            self.heights = raised
+            weight = np.where(raised < ceiling, weight, 0.0)
+
+    def _membrane_area(self, heights: Array) -> float:
+        dx, dy = np.gradient(heights, self.bag.cell)
+        return float(np.sqrt(1 + dx**2 + dy**2)[self.active].sum())
+
+    def _update_yield(self) -> None:
+        soil, cell = self.soil, self.bag.cell
+        dx, dy = np.gradient(self.heights, cell)
+        slope = np.sqrt(1 + dx**2 + dy**2)
+        self.stretch = soil.initial_stretch * np.sqrt(slope[self.active].sum() / self._rest_area)
+        self.tension = soil.membrane_modulus * (1 - self.stretch**-6)  # Neo-Hookean sheet [N/m].
+        curvature = np.gradient(dx / slope, cell, axis=0) + np.gradient(dy / slope, cell, axis=1)
+        confinement = 2 * self.tension / self.bag.cap_radius + soil.gravity_pressure + self.vacuum
+        cohesion = confinement * np.tan(soil.friction_angle)
+        depth = np.maximum(self._dome - self.heights, 0.0)
+        self.yield_pressure = (
+            cohesion * soil.cohesion_factor
+            + soil.bead_weight * soil.overburden_factor * depth
+            + self.tension * np.maximum(curvature, 0.0)
+        )
+
+    # Freezing.
+
+    def jam(self, contraction: float) -> None:
+        """Freeze: grains settle at the held surface and the free surface shrinks a little.
+
+        Args:
+            contraction: Volumetric shrinkage; all of it appears as height, the base is rigid.
+        """
+        ceiling = self._ceiling()
+        held = ceiling <= self.heights
+        self.heights = np.where(held, np.maximum(ceiling, self.bag.floor), self.heights)
+        self._shrinkage = np.where(held, 0.0, contraction * self.heights)
+        self.heights = self.heights - self._shrinkage
+        self._traction[:] = 0.0
+
+    def unjam(self) -> None:
+        """Let air in again: the shrinkage goes back, the imprint stays."""
+        self.heights = self.heights + self._shrinkage
+        self._shrinkage = np.zeros_like(self.heights)
+        self._update_yield()
+
+    # Saving.
+
+    def state(self) -> dict[str, Any]:
+        """Return a copy of everything that changes; `restore` continues bit for bit."""
+        return {
+            "heights": self.heights.copy(),
+            "traction": self._traction.copy(),
+            "shrinkage": self._shrinkage.copy(),
+            "yield_pressure": self.yield_pressure.copy(),
+            "reference": {name: R_JP.copy() for name, R_JP in self._reference.items()},
+            "scalars": np.array([getattr(self, name) for name in _SCALARS]),
+        }
+
+    def restore(self, state: dict[str, Any]) -> None:
+        """Return to a saved state."""
+        self.inflate()
+        self.heights = state["heights"].copy()
+        self._traction = state["traction"].copy()
+        self._shrinkage = state["shrinkage"].copy()
+        self.yield_pressure = state["yield_pressure"].copy()
+        self._reference = {name: R_JP.copy() for name, R_JP in state["reference"].items()}
+        for name, value in zip(_SCALARS, state["scalars"], strict=True):
+            setattr(self, name, float(value))
+
+
+def _cross_matrix(w: Array) -> Array:
+    """Return [w] with [w] v = w x v."""
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])

@@ -1,0 +1,322 @@
+"""The frozen bed as a tetrahedral mesh that conforms to the part held in it.
+
+The floor takes over the facets of the part's `bed_*` hulls one to one, the wall follows their
+outline, and rings of columns carry the bed's own height out to the rim. A mesh that does not share
+the part's facets pushes it out or lets it tip, whatever the physics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from cell.soft_jig.bed import Bed
+from cell.soft_jig.columns import BadMesh, Column, ColumnMesh, TetMesh
+from cell.soft_jig.parameters import JammedParameters
+from cell.soft_jig.polygons import (
+    WELD,
+    Facet,
+    area,
+    clip,
+    contains,
+    convex_hull,
+    edge_normals,
+    lower_facets,
+    subtract,
+)
+
+Array = NDArray[np.float64]
+
+# A bed this close below a part still touches it [m]: the error of a 1.5 mm grid on a curved part.
+TOUCH = 3e-4
+# Rays that find the contact's border; more only follow the dome's curvature better.
+RAYS = 24
+# Least height of a column around the part [m].
+RIM_HEIGHT = 0.002
+# Facets cut down to less than this at the border of the contact are left out [m2].
+SLIVER = 1e-6
+# A body that reaches further than this over the outline's edge counts as overhead [m].
+OVERHANG = 5e-4
+# Lower walls than this are left out [m].
+LEAST_WALL = 1e-3
+
+
+def bed_mesh(bed: Bed, params: JammedParameters) -> TetMesh:
+    """Return a mesh of the bed's own surface, with no part in it."""
+    angle = np.arange(RAYS) * 2 * np.pi / RAYS
+    circle = 1.5 * params.ring * np.column_stack([np.cos(angle), np.sin(angle)])
+    loop = list(range(RAYS))
+    tops = bed.height_at(circle)
+    floor = [_floor_column(loop, circle, tops, float(bed.height_at(np.zeros((1, 2)))[0]), params)]
+    return _with_rings(bed, params, circle, floor, loop, tops, np.zeros(2))
+
+
+def imprint_mesh(
+    bed: Bed, params: JammedParameters, hulls: Sequence[Array], lean: Array | None = None
+) -> TetMesh:
+    """Return a mesh of the bed with the imprint of a part.
+
+    Args:
+        bed: The frozen bed.
+        params: Squeeze, ring width and layer depth.
+        hulls: Vertices (n, 3) in J of the part's convex hulls that touch the bed.
+        lean: (2,) horizontal shift per height of the part's walls; zero for an upright part.
+    """
+    undersides = _touching_bodies(bed, hulls)
+    if not undersides:
+        return bed_mesh(bed, params)
+    facets = _touching_facets(bed, undersides)
+    plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
+    loop = outline(cells)
+    plane[loop] = offset_loop(plane[loop], params.squeeze)
+    tops = [facet.height(plane[cell]) for facet, cell in zip(facets, cells, strict=True)]
+    floor = [
+        _floor_column(cell, plane, top, float(top.mean()), params)
+        for cell, top in zip(cells, tops, strict=True)
+    ]
+    foot = {i: z for cell, top in zip(cells, tops, strict=True) for i, z in zip(cell, top, strict=True)}
+    roof = _roof(plane[loop], np.array([foot[i] for i in loop]), undersides)
+    lean = np.zeros(2) if lean is None else lean
+    return _with_rings(bed, params, plane, floor, loop, roof, lean)
+
+
+# Where the part touches.
+
+
+def _lowest(underside: list[Facet]) -> float:
+    return min(float(facet.height(facet.polygon).min()) for facet in underside)
+
+
+def _silhouette(underside: list[Facet]) -> Array:
+    return convex_hull(np.concatenate([facet.polygon for facet in underside]))
+
+
+def _envelope(undersides: Sequence[list[Facet]], xy: Array) -> Array:
+    """Return the lowest height of the bodies over (n, 2) points, infinite where there is none."""
+    lowest = np.full(len(xy), np.inf)
+    for underside in undersides:
+        # Under a convex body the lower surface is the highest of its facets' planes.
+        height = np.max([facet.height(xy) for facet in underside], axis=0)
+        inside = contains(_silhouette(underside), xy)
+        lowest = np.where(inside, np.minimum(lowest, height), lowest)
+    return lowest
+
+
+def _touching_bodies(bed: Bed, hulls: Sequence[Array]) -> list[list[Facet]]:
+    """Return the undersides of the bodies that reach the bed, lowest first."""
+    undersides = sorted((lower_facets(hull) for hull in hulls), key=_lowest)
+    xy, surface = _surface(bed)
+    return [body for body in undersides if np.any(_envelope([body], xy) < surface)]
+
+
+def _surface(bed: Bed) -> tuple[Array, Array]:
+    xy = np.column_stack([bed.x[bed.active], bed.y[bed.active]])
+    return xy, bed.heights[bed.active] + TOUCH
+
+
+def _touching_facets(bed: Bed, undersides: Sequence[list[Facet]]) -> list[Facet]:
+    """Return the parts of the facets that the bed touches; where bodies overlap, the lower one's."""
+    xy, surface = _surface(bed)
+    touched = _envelope(undersides, xy) < surface
+    window = _contact_window(bed, undersides, xy[touched].mean(axis=0))
+    facets: list[Facet] = []
+    lower: list[Array] = []
+    for underside in undersides:
+        for facet in underside:
+            piece = clip(facet.polygon, window)
+            pieces = [piece] if len(piece) and area(piece) > SLIVER else []
+            for footprint in lower:
+                pieces = [rest for piece in pieces for rest in subtract(piece, footprint)]
+            facets += [replace(facet, polygon=piece) for piece in pieces if len(piece)]
+        lower.append(_silhouette(underside))
+    return facets
+
+
+def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) -> Array:
+    """Return a convex polygon around the contact.
+
+    Where a ray reaches the part's outline before it leaves the bed, the window passes well outside
+    the outline, so that clipping leaves the part's own edges untouched.
+    """
+    step, margin = 0.25e-3, 2 * bed.bag.cell
+    reach = np.arange(step, 2 * bed.bag.aperture_radius, step)
+    window = []
+    for angle in (np.arange(RAYS) + 0.5) * 2 * np.pi / RAYS:
+        ray = np.array([np.cos(angle), np.sin(angle)])
+        xy = center + reach[:, None] * ray
+        height = _envelope(undersides, xy)
+        part_end = reach[np.isfinite(height)].max(initial=step)
+        bed_end = reach[height < bed.height_at(xy) + TOUCH].max(initial=step)
+        at_outline = bed_end > part_end - margin
+        window.append(center + (part_end + 2 * margin if at_outline else bed_end) * ray)
+    return convex_hull(np.array(window))
+
+
+def _roof(loop: Array, foot: Array, undersides: Sequence[list[Facet]]) -> Array:
+    """Return how high the bed may stand beside the outline (n,) [m]: what hangs over it, if any.
+
+    Along an edge where the contact ends under the part, the bed beside it stays at the floor.
+    """
+    normal, _ = edge_normals(loop)
+    beside = (loop + np.roll(loop, -1, axis=0)) / 2 + OVERHANG * normal
+    overhead = _envelope(undersides, beside)
+    lower = np.minimum(overhead, np.roll(overhead, 1))
+    return np.where(lower < foot + LEAST_WALL, foot, lower)
+
+
+def _outward(xy: Array) -> Array:
+    """Return unit vectors (n, 2) away from the middle of a loop."""
+    away = xy - (xy.min(axis=0) + xy.max(axis=0)) / 2
+    return away / np.linalg.norm(away, axis=1)[:, None]
+
+
+# Columns.
+
+
+def _floor_column(
+    corners: list[int], plane: Array, tops: Array, center_top: float, params: JammedParameters
+) -> Column:
+    height = center_top - min(params.layer, center_top / 2)
+    return Column(corners, tops, center_top, np.array([*plane[corners].mean(axis=0), height]))
+
+
+def _with_rings(
+    bed: Bed,
+    params: JammedParameters,
+    plane: Array,
+    floor: list[Column],
+    loop: list[int],
+    roof: Array,
+    lean: Array,
+) -> TetMesh:
+    """Surround the floor with a ring of columns at the wall and one out to the aperture."""
+    inner, away = plane[loop], _outward(plane[loop])
+    # The cap is steep at its edge: end a little inside, with an upright face.
+    to_edge = _distance_to_circle(inner, away, bed.bag.aperture_radius - 2 * bed.bag.cell)
+    middle = inner + away * np.minimum(params.ring, to_edge / 2)[:, None]
+    outer = inner + away * to_edge[:, None]
+    n, count = len(plane), len(loop)
+    rings = [loop, list(range(n, n + count)), list(range(n + count, n + 2 * count))]
+    points = np.concatenate([plane, middle, outer])
+    foot = {i: z for column in floor for i, z in zip(column.corners, column.tops, strict=True)}
+    floor_top = np.array([foot[i] for i in loop])
+    # The first cells around an imprint are half in it.
+    beside = inner + away * 1.5 * bed.bag.cell
+    tops = [np.maximum(np.minimum(bed.height_at(beside), roof), floor_top)]
+    for ring in (middle, outer):
+        tops.append(np.maximum(np.minimum(bed.height_at(ring), roof), RIM_HEIGHT))
+    columns = list(floor)
+    for level in (0, 1):
+        for k in range(count):
+            j = (k + 1) % count
+            corners = [rings[level][k], rings[level + 1][k], rings[level + 1][j], rings[level][j]]
+            top = np.array(
+                [tops[level][k], tops[level + 1][k], tops[level + 1][j], tops[level][j]]
+            )
+            wall = [foot[corners[0]], foot[corners[3]]] if level == 0 else []
+            columns.append(_ring_column(corners, points, top, wall, params))
+    return ColumnMesh(points, columns, lean).build()
+
+
+def _ring_column(
+    corners: list[int], plane: Array, tops: Array, foot: list[float], params: JammedParameters
+) -> Column:
+    """Return a column whose apex lies behind the middle of its wall, one layer below its top."""
+    xy = plane[corners].mean(axis=0)
+    # Both triangles of the top face must be seen from below.
+    top = min(_plane_height(plane, corners, tops, three, xy) for three in ([0, 1, 2], [0, 2, 3]))
+    height = top - min(params.layer, top / 2)
+    if foot:
+        height = min(height, (float(np.mean(foot)) + top) / 2)
+    return Column(corners, tops, top, np.array([*xy, height]))
+
+
+def _plane_height(
+    plane: Array, corners: list[int], tops: Array, three: list[int], xy: Array
+) -> float:
+    points = np.column_stack([plane[corners][three], np.ones(3)])
+    return float(np.array([*xy, 1.0]) @ np.linalg.solve(points, tops[three]))
+
+
+def _distance_to_circle(xy: Array, direction: Array, radius: float) -> Array:
+    along = np.einsum("ij,ij->i", xy, direction)
+    return -along + np.sqrt(along**2 + radius**2 - np.einsum("ij,ij->i", xy, xy))
+
+
+# Plane topology.
+
+
+def conforming_cells(polygons: Sequence[Array], longest: float) -> tuple[Array, list[list[int]]]:
+    """Weld polygons into cells that share whole edges, outer edges split to `longest` [m]."""
+    points: list[Array] = []
+    cells = [[_weld(points, xy) for xy in polygon] for polygon in polygons]
+    cells = [_with_hanging_vertices(cell, points) for cell in cells]
+    shared = {edge for cell in cells for edge in _edges(cell)}
+    split = [_split_outer_edges(cell, points, shared, longest) for cell in cells]
+    return np.array(points), split
+
+
+def _weld(points: list[Array], xy: Array) -> int:
+    for i, known in enumerate(points):
+        if np.abs(known - xy).max() < 10 * WELD:
+            return i
+    points.append(np.asarray(xy, dtype=float))
+    return len(points) - 1
+
+
+def _edges(cell: list[int]) -> list[tuple[int, int]]:
+    return list(zip(cell, [*cell[1:], cell[0]], strict=True))
+
+
+def _with_hanging_vertices(cell: list[int], points: list[Array]) -> list[int]:
+    """Insert the vertices of other cells that lie on this cell's edges."""
+    cell = list(dict.fromkeys(cell))
+    full = []
+    for a, b in _edges(cell):
+        edge = points[b] - points[a]
+        length = float(np.linalg.norm(edge))
+        offset = np.array(points) - points[a]
+        along = offset @ edge / length
+        beside = np.abs(offset @ np.array([-edge[1], edge[0]])) / length
+        on = np.flatnonzero((beside < 10 * WELD) & (along > WELD) & (along < length - WELD))
+        full += [a, *(int(i) for i in on[np.argsort(along[on])] if i not in (a, b))]
+    return full
+
+
+def _split_outer_edges(
+    cell: list[int], points: list[Array], shared: set[tuple[int, int]], longest: float
+) -> list[int]:
+    full = []
+    for a, b in _edges(cell):
+        full.append(a)
+        if (b, a) not in shared:
+            pieces = int(np.ceil(np.linalg.norm(points[b] - points[a]) / longest))
+            for k in range(1, pieces):
+                points.append(points[a] + (points[b] - points[a]) * k / pieces)
+                full.append(len(points) - 1)
+    return full
+
+
+def outline(cells: Sequence[list[int]]) -> list[int]:
+    """Return the counter-clockwise loop of vertices around all cells."""
+    edges = {edge for cell in cells for edge in _edges(cell)}
+    following = {a: b for a, b in edges if (b, a) not in edges}
+    loop = [min(following)]
+    while following[loop[-1]] != loop[0]:
+        loop.append(following[loop[-1]])
+        if len(loop) > len(following):
+            break
+    if len(loop) != len(following):
+        raise BadMesh("The part touches the bed in separate patches; the jig meshes one outline.")
+    return loop
+
+
+def offset_loop(polygon: Array, distance: float) -> Array:
+    """Return the loop with every edge moved outwards by `distance` (inwards if negative)."""
+    normal, _ = edge_normals(polygon)
+    before = np.roll(normal, 1, axis=0)
+    both = normal + before
+    return polygon + distance * both / (1 + np.einsum("ij,ij->i", normal, before))[:, None]

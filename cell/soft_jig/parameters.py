@@ -1,0 +1,151 @@
+"""Every number of the soft jig, with its unit, source and range.
+
+Source tags: [S] the paper, [R] read in the source named, [M] measured on public CAD,
+[D] derived from stated inputs, [A] assumption. "DEM" is the project's discrete-element reference
+run with glass beads in a dome of the same size.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+
+@dataclass(frozen=True)
+class BagParameters:
+    """The bag at rest: a spherical cap of beads under a silicone membrane.
+
+    Attributes:
+        cap_radius: Radius of the sphere the cap is cut from [m]. [S] about 60 mm.
+        cap_height: Apex above the base plate [m]. [D] from 296 cm3 [S] and the radius.
+        cell: Edge of a height-field cell [m]. [A] 1-3 mm; 1.5 resolves the motor's terminals.
+        floor: Least thickness of beads over the base plate [m]. [A] three 1 mm beads.
+    """
+
+    cap_radius: float = 0.060
+    cap_height: float = 0.0459
+    cell: float = 0.0015
+    floor: float = 0.003
+
+    @property
+    def aperture_radius(self) -> float:
+        """Radius of the opening that the cap rises from [m]; [D] 58.3 mm."""
+        return float(np.sqrt(self.cap_height * (2 * self.cap_radius - self.cap_height)))
+
+    @property
+    def volume(self) -> float:
+        """Volume of the cap [m3]; [D] 296 cm3."""
+        return float(np.pi * self.cap_height**2 * (self.cap_radius - self.cap_height / 3))
+
+
+@dataclass(frozen=True)
+class SoilParameters:
+    """Beads and membrane while soft: an elastic-plastic bed with stretch hardening.
+
+    Attributes:
+        friction_angle: Of the beads [rad]. [R] DEM 23-27 deg; 25 deg, range 22-28.
+        bead_weight: Bulk weight gamma [N/m3]. [D] 450 g in 296 cm3 [S].
+        gravity_pressure: Mean confinement by the beads' own weight [Pa]. [D] 250, range 200-420.
+        membrane_modulus: Shear modulus times thickness [N/m]. [R] 0.15 MPa x 1 mm; 100-150.
+        initial_stretch: Stretch of the membrane on the bare cap. [A] 1.02, range 1.00-1.05.
+        stiffness: Elastic Winkler modulus [Pa/m]. [A] 3e7: what an explicit step of 1 ms carries
+            under a free 68 g plate. It springs back 0.3 mm where DEM gives below 0.06 mm.
+        damping: Viscous part of the contact pressure [Pa s/m]. [A] numerical, below 2 % of the
+            yield pressure at 10 mm/s.
+        viscosity: Overstress per plastic sinking speed [Pa s/m]. [A] 5e4, 0.5 kPa at 10 mm/s;
+            DEM finds no rate effect at 10-80 mm/s, so keep it small.
+        shear_stiffness: Tangential Winkler modulus of the membrane [Pa/m]. [A] 3e7; the 1 mm
+            silicone sheet alone gives 1.5e8 [D], too stiff for an explicit step.
+        surface_friction: Silicone on metal. [R] 0.6-1.3; 0.9.
+        collar_length: Decay length of the raised collar [m]. [A] 12 mm; DEM peak at 16 mm.
+        packing_slack: Volume the packing takes up before the collar rises [m3]. [A] 0; the fill
+            allows 0-12e-6 [D], but DEM beds dilate rather than compact.
+        settle_period: Time between two redistributions of displaced volume [s]. [A]
+    """
+
+    friction_angle: float = float(np.radians(25.0))
+    bead_weight: float = 1520.0 * 9.81
+    gravity_pressure: float = 250.0
+    membrane_modulus: float = 150.0
+    initial_stretch: float = 1.02
+    stiffness: float = 3.0e7
+    damping: float = 1.0e4
+    viscosity: float = 5.0e4
+    shear_stiffness: float = 3.0e7
+    surface_friction: float = 0.9
+    collar_length: float = 0.012
+    packing_slack: float = 0.0
+    settle_period: float = 0.010
+
+    @property
+    def overburden_factor(self) -> float:
+        """Bearing factor Nq of a strip on a cohesionless bed (Prandtl-Reissner)."""
+        tangent = np.tan(self.friction_angle)
+        return float(np.exp(np.pi * tangent) * np.tan(np.pi / 4 + self.friction_angle / 2) ** 2)
+
+    @property
+    def cohesion_factor(self) -> float:
+        """Bearing factor Nc = (Nq - 1) / tan(phi); 20.7 at 25 deg."""
+        return float((self.overburden_factor - 1) / np.tan(self.friction_angle))
+
+
+@dataclass(frozen=True)
+class VacuumParameters:
+    """The pump.
+
+    Attributes:
+        pressure: Confining pressure when pumped out [Pa]. [S] about 90 kPa.
+        time_constant: First-order response [s]. [D] 0.25, range 0.23-0.70 for 30-10 L/min.
+        jam_fraction: Part of the full pressure above which the bed counts as frozen. [A] 0.95.
+        contraction: Volumetric shrinkage on evacuation. [R] DEM 0.4 %; below 1 % in the literature.
+    """
+
+    pressure: float = 90e3
+    time_constant: float = 0.25
+    jam_fraction: float = 0.95
+    contraction: float = 0.004
+
+
+@dataclass(frozen=True)
+class JammedParameters:
+    """The frozen bed: a compliant hydroelastic body.
+
+    Attributes:
+        pressure_gradient: Contact pressure per depth [Pa/m]. [A] 2.5e8 (1-5 MPa over 4-20 mm);
+            holding hardly depends on it, holding stiffness does.
+        soft_gradient: The same while not jammed, for hands that touch the bag [Pa/m]. [A] one
+            tenth: stiffness of a packing goes with the square root of pressure [R].
+        squeeze: Offset g of the wall from the part's outline [m], negative squeezes. [R] DEM: the
+            dent closes 0.05 mm on evacuation; range 0 to -0.2 mm. It dominates holding.
+        friction: Membrane on metal. [R] 0.6-1.3; 0.9.
+        dissipation: Hunt-Crossley [s/m]. [A] 5; 0-50 changes holding by 15 %.
+        layer: Depth of the pressure field's interior vertices [m]. [A] 5 mm.
+        ring: Radial width of the ring of cells around the part [m]. [A] 10 mm, twice `layer`.
+        edge: Longest edge along the outline [m]. [A] 12 mm.
+    """
+
+    pressure_gradient: float = 2.5e8
+    soft_gradient: float = 2.5e7
+    squeeze: float = -0.05e-3
+    friction: float = 0.9
+    dissipation: float = 5.0
+    layer: float = 0.005
+    ring: float = 0.010
+    edge: float = 0.012
+
+
+@dataclass(frozen=True)
+class JigParameters:
+    """All of the soft jig.
+
+    Attributes:
+        visual_period: Time between two refreshes of the visible membrane while something presses
+            into it [s]; infinity refreshes at changes of state only.
+    """
+
+    bag: BagParameters = field(default_factory=BagParameters)
+    soil: SoilParameters = field(default_factory=SoilParameters)
+    vacuum: VacuumParameters = field(default_factory=VacuumParameters)
+    jammed: JammedParameters = field(default_factory=JammedParameters)
+    visual_period: float = float("inf")

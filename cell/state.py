@@ -1,0 +1,90 @@
+"""Save and restore all state of a run: continuing from a restored state is bit-identical."""
+
+from __future__ import annotations
+
+import ast
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cell.simulation import Simulation
+from cell.thread import ThreadState
+
+State = dict[str, np.ndarray]
+
+
+def save_state(simulation: Simulation) -> State:
+    """Return time, q, v, commands, drive modes, sleep, threads and jig as named arrays."""
+    cell, root, context = simulation.cell, simulation.root, simulation.context
+    state: State = {
+        "steps": np.array(simulation.steps),
+        "q": cell.plant.GetPositions(context).copy(),
+        "v": cell.plant.GetVelocities(context).copy(),
+        "rng": np.array(repr(simulation.sensor.rng.bit_generator.state)),
+    }
+    for name, drive in _drives(simulation).items():
+        state[f"{name}/target"], state[f"{name}/effort"] = drive.values(root)
+    for name, arm in cell.arms.items():
+        state[f"{name}/torque_drive"] = np.array(arm.in_torque_drive())
+    for part in cell.parts:
+        state[f"asleep/{part.part.name}"] = np.array(part.asleep)
+    for name, thread in cell.threads.items():
+        state[f"thread/{name}/state"] = np.array(thread.state.value)
+        state[f"thread/{name}/caught_angle"] = np.array(thread.caught_angle)
+        bit = -1 if thread.bit_position is None else thread.bit_position
+        state[f"thread/{name}/bit"] = np.array(bit)
+    for name, value in cell.soft_jig.save_state().items():
+        state[f"jig/{name}"] = np.array(value)
+    return state
+
+
+def restore_state(simulation: Simulation, state: State) -> None:
+    """Put a simulation of the same cell into a saved state."""
+    cell, root, context = simulation.cell, simulation.root, simulation.context
+    for name, thread in cell.threads.items():
+        thread.restore(
+            root,
+            ThreadState(str(state[f"thread/{name}/state"])),
+            int(state[f"thread/{name}/bit"]),
+            float(state[f"thread/{name}/caught_angle"]),
+        )
+    jig = {key[4:]: value for key, value in state.items() if key.startswith("jig/")}
+    cell.soft_jig.restore_state(root, jig)
+    for part in cell.parts:
+        part.wake(root)
+        if state[f"asleep/{part.part.name}"]:
+            part.sleep(root)
+    for name, arm in cell.arms.items():
+        (arm.use_torque_drive if state[f"{name}/torque_drive"] else arm.use_position_drive)()
+    for name, drive in _drives(simulation).items():
+        target, effort = state[f"{name}/target"], state[f"{name}/effort"]
+        drive.set_target(root, *np.split(target, 2))
+        drive.set_effort(root, effort)
+    simulation.steps = int(state["steps"])
+    root.SetTime(simulation.time)
+    cell.plant.SetPositions(context, state["q"])
+    cell.plant.SetVelocities(context, state["v"])
+    simulation.sensor.rng.bit_generator.state = _literal(str(state["rng"]))
+    simulation.simulator.Initialize()
+
+
+def _literal(text: str) -> Any:
+    """Read back the generator state, a dictionary of numbers and names."""
+    return ast.literal_eval(text)
+
+
+def _drives(simulation: Simulation) -> dict[str, Any]:
+    cell = simulation.cell
+    return {**cell.drives, "gripper": cell.gripper.drive, "driver": cell.driver.drive}
+
+
+def write_state(path: Path, state: State) -> None:
+    """Write a saved state to a compressed npz."""
+    np.savez_compressed(path, **state)
+
+
+def read_state(path: Path) -> State:
+    """Read a saved state from an npz."""
+    with np.load(path) as archive:
+        return {name: archive[name] for name in archive.files}
