@@ -1,0 +1,89 @@
+"""Plots for the report, each from plain arrays to a PNG."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+SIZE = (8.0, 3.6)  # [inch]
+DPI = 110
+
+
+def plot_insertion_force(depth: np.ndarray, force: np.ndarray, limit: float | None = None) -> bytes:
+    """Plot the force of an insertion over its depth.
+
+    Args:
+        depth: (n,) how far the part is in [m].
+        force: (n, 3) force on the part in W [N].
+        limit: The downward force at which the arm yields [N].
+    """
+    figure, axes = _axes("depth [mm]", "force [N]")
+    lateral = np.hypot(force[:, 0], force[:, 1])
+    axes.plot(1e3 * depth, np.abs(force[:, 2]), label="axial")
+    axes.plot(1e3 * depth, lateral, label="lateral")
+    if limit is not None:
+        axes.axhline(limit, color="0.5", linestyle="--", label="limit")
+    return _png(figure, axes)
+
+
+def plot_torque(
+    angle: Mapping[str, np.ndarray], torque: Mapping[str, np.ndarray], target: float | None = None
+) -> bytes:
+    """Plot the tightening torque over the angle, one curve per bolt.
+
+    Args:
+        angle: Bolt name -> (n,) angle since the thread caught [rad].
+        torque: Bolt name -> (n,) torque [N m].
+        target: Tightening torque to reach [N m].
+    """
+    figure, axes = _axes("angle [turns]", "torque [N m]")
+    for name, values in angle.items():
+        axes.plot(values / (2 * np.pi), torque[name], label=name)
+    if target is not None:
+        axes.axhline(target, color="0.5", linestyle="--", label="target")
+    return _png(figure, axes)
+
+
+def plot_force_plate(
+    time: np.ndarray, force: np.ndarray, phases: Sequence[tuple[str, float]] = ()
+) -> bytes:
+    """Plot what the force plate under the jig feels.
+
+    Args:
+        time: (n,) [s].
+        force: (n, 3) force on the plate in W [N].
+        phases: Name and start [s] of what happens, drawn as labelled lines.
+    """
+    figure, axes = _axes("time [s]", "force [N]")
+    axes.plot(time, np.abs(force[:, 2]), label="normal")
+    axes.plot(time, np.hypot(force[:, 0], force[:, 1]), label="shear")
+    for name, start in phases:
+        axes.axvline(start, color="0.8", linewidth=0.8, zorder=0)
+        axes.annotate(
+            name, (start, 1.0), xycoords=("data", "axes fraction"), rotation=90,
+            fontsize=6, color="0.4", ha="left", va="top",
+        )  # fmt: skip
+    return _png(figure, axes)
+
+
+def _axes(x_label: str, y_label: str) -> tuple[Figure, Axes]:
+    figure = Figure(figsize=SIZE, dpi=DPI, layout="constrained")
+    axes = figure.add_subplot()
+    axes.set_xlabel(x_label)
+    axes.set_ylabel(y_label)
+    axes.grid(alpha=0.3)
+    axes.spines[["top", "right"]].set_visible(False)
+    return figure, axes
+
+
+def _png(figure: Figure, axes: Axes) -> bytes:
+    if axes.get_legend_handles_labels()[1]:
+        axes.legend(fontsize=8, frameon=False)
+    buffer = io.BytesIO()
+    FigureCanvasAgg(figure).print_png(buffer)
+    return buffer.getvalue()

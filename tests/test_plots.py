@@ -1,0 +1,52 @@
+"""Plots: a PNG each, that follows the data and nothing else."""
+
+import io
+
+import numpy as np
+import pytest
+from matplotlib.image import imread
+
+from experiments.plots import DPI, SIZE, plot_force_plate, plot_insertion_force, plot_torque
+
+N = 50
+RAMP = np.linspace(0.0, 1.0, N)
+FORCE = np.stack([RAMP, 0.5 * RAMP, -10.0 * RAMP], axis=1)
+PLOTS = {
+    "insertion": lambda scale: plot_insertion_force(6e-3 * RAMP, scale * FORCE, limit=10.0),
+    "torque": lambda scale: plot_torque(
+        {"bolt_1": 30.0 * RAMP, "bolt_2": 25.0 * RAMP},
+        {"bolt_1": scale * RAMP**4, "bolt_2": 0.5 * RAMP**4},
+        target=0.5,
+    ),
+    "plate": lambda scale: plot_force_plate(
+        20.0 * RAMP, scale * FORCE, phases=[("press", 0.0), ("release", 5.0)]
+    ),
+}
+
+
+def pixels(png: bytes) -> np.ndarray:
+    return imread(io.BytesIO(png), format="png")
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_plot_is_a_picture_of_the_stated_size(name: str) -> None:
+    width, height = (round(DPI * side) for side in SIZE)
+    assert pixels(PLOTS[name](1.0)).shape[:2] == (height, width)
+
+
+@pytest.mark.parametrize("name", PLOTS)
+def test_plot_is_reproducible_and_follows_the_data(name: str) -> None:
+    assert PLOTS[name](1.0) == PLOTS[name](1.0)
+    assert PLOTS[name](1.0) != PLOTS[name](0.3)
+
+
+def test_sign_of_the_axial_force_does_not_matter() -> None:
+    """The plots show how hard, whichever side is measured."""
+    assert plot_insertion_force(RAMP, FORCE) == plot_insertion_force(RAMP, -FORCE)
+
+
+def test_empty_run_still_gives_a_picture() -> None:
+    """An assembly that failed before its first bolt has a report all the same."""
+    nothing = np.zeros(0)
+    assert pixels(plot_torque({}, {})).size
+    assert pixels(plot_force_plate(nothing, np.zeros((0, 3)))).size
