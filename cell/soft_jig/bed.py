@@ -93,7 +93,11 @@ class Bed:
     # Pressing.
 
     def press(
-        self, X_JP: tuple[Array, Array], V_JP: tuple[Array, Array], samples: SurfaceSamples, dt: float
+        self,
+        X_JP: tuple[Array, Array],
+        V_JP: tuple[Array, Array],
+        samples: SurfaceSamples,
+        dt: float,
     ) -> tuple[Array, Array]:
         """Push a part into the bed for one step.
 

@@ -77,7 +77,9 @@ def imprint_mesh(
         _floor_column(cell, plane, top, float(top.mean()), params)
         for cell, top in zip(cells, tops, strict=True)
     ]
-    foot = {i: z for cell, top in zip(cells, tops, strict=True) for i, z in zip(cell, top, strict=True)}
+    foot = {
+        i: z for cell, top in zip(cells, tops, strict=True) for i, z in zip(cell, top, strict=True)
+    }
     roof = _roof(plane[loop], np.array([foot[i] for i in loop]), undersides)
     lean = np.zeros(2) if lean is None else lean
     return _with_rings(bed, params, plane, floor, loop, roof, lean)
@@ -141,7 +143,7 @@ def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) 
     Where a ray reaches the part's outline before it leaves the bed, the window passes well outside
     the outline, so that clipping leaves the part's own edges untouched.
     """
-    step, margin = 0.25e-3, 2 * bed.bag.cell
+    step, margin, clear = 0.25e-3, 0.5e-3, 4 * bed.bag.cell
     reach = np.arange(step, 2 * bed.bag.aperture_radius, step)
     window = []
     for angle in (np.arange(RAYS) + 0.5) * 2 * np.pi / RAYS:
@@ -151,7 +153,7 @@ def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) 
         part_end = reach[np.isfinite(height)].max(initial=step)
         bed_end = reach[height < bed.height_at(xy) + TOUCH].max(initial=step)
         at_outline = bed_end > part_end - margin
-        window.append(center + (part_end + 2 * margin if at_outline else bed_end) * ray)
+        window.append(center + (part_end + clear if at_outline else bed_end) * ray)
     return convex_hull(np.array(window))
 
 
@@ -213,9 +215,7 @@ def _with_rings(
         for k in range(count):
             j = (k + 1) % count
             corners = [rings[level][k], rings[level + 1][k], rings[level + 1][j], rings[level][j]]
-            top = np.array(
-                [tops[level][k], tops[level + 1][k], tops[level + 1][j], tops[level][j]]
-            )
+            top = np.array([tops[level][k], tops[level + 1][k], tops[level + 1][j], tops[level][j]])
             wall = [foot[corners[0]], foot[corners[3]]] if level == 0 else []
             columns.append(_ring_column(corners, points, top, wall, params))
     return ColumnMesh(points, columns, lean).build()

@@ -58,7 +58,9 @@ class SurfaceSamples:
         doubled = np.linalg.norm(cross, axis=1)
         kept = doubled > 1e-14
         normals = cross[kept] / doubled[kept, None]
-        return SurfaceSamples(name, triangles[kept].mean(axis=1), normals, doubled[kept] / 2, spacing)
+        return SurfaceSamples(
+            name, triangles[kept].mean(axis=1), normals, doubled[kept] / 2, spacing
+        )
 
     def underside(self, R_JP: Array, bin_size: float) -> Underside:
         """Return one point per square bin of the surface seen from below, with its area.

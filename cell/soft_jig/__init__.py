@@ -1,0 +1,23 @@
+"""The soft jig: a bag of beads that conforms to a part while soft and freezes under vacuum."""
+
+from cell.soft_jig.jig import JigError, JigState, SoftJig
+from cell.soft_jig.parameters import (
+    BagParameters,
+    JammedParameters,
+    JigParameters,
+    SoilParameters,
+    VacuumParameters,
+)
+from cell.soft_jig.samples import SurfaceSamples
+
+__all__ = [
+    "BagParameters",
+    "JammedParameters",
+    "JigError",
+    "JigParameters",
+    "JigState",
+    "SoftJig",
+    "SoilParameters",
+    "SurfaceSamples",
+    "VacuumParameters",
+]

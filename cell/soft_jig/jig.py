@@ -1,0 +1,391 @@
+"""The soft jig in Drake: pressure, state machine, press forces and the swap of contact geometry.
+
+While soft, the part is carried by the plastic bed (`cell.soft_jig.bed`) through external forces.
+When the vacuum has nearly built up, the bed freezes: its contact geometry becomes a compliant
+hydroelastic mesh that conforms to the part, and the external forces stop. Geometry is replaced in
+the Context, between steps; nothing here needs a new diagram.
+"""
+
+from __future__ import annotations
+
+from enum import Enum
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common import MemoryFile
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    Box,
+    CollisionFilterDeclaration,
+    Convex,
+    GeometryId,
+    GeometrySet,
+    InMemoryMesh,
+    Mesh,
+    ProximityProperties,
+    Role,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import (
+    CoulombFriction,
+    ExternallyAppliedSpatialForce,
+    MultibodyPlant,
+)
+from pydrake.multibody.tree import BodyIndex, RigidBody
+from pydrake.systems.framework import Context
+
+from cell.errors import CellError
+from cell.soft_jig.bed import Bed
+from cell.soft_jig.columns import TetMesh
+from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
+from cell.soft_jig.parameters import JigParameters
+from cell.soft_jig.samples import SurfaceSamples
+from cell.soft_jig.visual import membrane_shape
+
+Array = NDArray[np.float64]
+
+# Collision geometries whose name starts like this touch the frozen bed; all others of the same
+# body do not.
+BED_PREFIX = "bed_"
+SILICONE_COLOR = (0.85, 0.75, 0.55, 1.0)
+
+
+class JigState(Enum):
+    """What the bag is: blown up, soft with air let out, or frozen by the vacuum."""
+
+    INFLATED = "inflated"
+    SOFT = "soft"
+    JAMMED = "jammed"
+
+
+class JigError(CellError):
+    """The soft jig was asked for something its state does not allow."""
+
+
+class SoftJig:
+    """A bag of beads on a base body.
+
+    Attributes:
+        params: All numbers.
+        bed: The surface and its constitutive model.
+        state: Where the jig is in INFLATED -> SOFT -> JAMMED -> SOFT.
+        pressure: Confining pressure in the bag [Pa].
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        base_body: RigidBody,
+        params: JigParameters,
+        X_BJ: RigidTransform,
+        ids: tuple[GeometryId, GeometryId],
+        mesh: TetMesh,
+    ) -> None:
+        self.params = params
+        self.bed = Bed(params.bag, params.soil)
+        self.state = JigState.INFLATED
+        self.pressure = 0.0
+        self._pumping = False
+        self._plant, self._scene_graph = plant, scene_graph
+        self._base, self._X_BJ = base_body, X_BJ
+        self._bed_id, self._visual_id = ids
+        self._mesh = mesh
+        self._pressing: dict[str, tuple[RigidBody, SurfaceSamples]] = {}
+        self._forces: list[ExternallyAppliedSpatialForce] = []
+        self._since_drawn = 0.0
+
+    @staticmethod
+    def add(
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        base_body: RigidBody,
+        params: JigParameters | None = None,
+        X_BJ: RigidTransform | None = None,
+    ) -> SoftJig:
+        """Put an inflated bag on a base body; call before the plant is finalized.
+
+        Args:
+            plant: Discrete plant with contact model hydroelastic_with_fallback.
+            scene_graph: The plant's scene graph.
+            base_body: The jig's base.
+            params: All numbers; None takes the defaults.
+            X_BJ: Pose of the jig frame J in the base body; None if they coincide.
+        """
+        params = JigParameters() if params is None else params
+        X_BJ = RigidTransform() if X_BJ is None else X_BJ
+        bed = Bed(params.bag, params.soil)
+        mesh = bed_mesh(bed, params.jammed)
+        soft = _proximity(mesh, params, params.jammed.soft_gradient)
+        bed_id = plant.RegisterCollisionGeometry(
+            base_body, X_BJ, _shape(mesh), "soft_jig_bed", soft
+        )
+        color = np.array(SILICONE_COLOR)
+        visual_id = plant.RegisterVisualGeometry(
+            base_body, X_BJ, membrane_shape(bed), "soft_jig_membrane", color
+        )
+        return SoftJig(plant, scene_graph, base_body, params, X_BJ, (bed_id, visual_id), mesh)
+
+    # Commands.
+
+    def inflate(self, root_context: Context) -> None:
+        """Blow the bag up: pressure off, every imprint gone. Also the way to start."""
+        self.pressure = 0.0
+        self._pumping = False
+        self.state = JigState.INFLATED
+        self.bed.inflate()
+        self._show_bed(root_context)
+
+    def soften(self, root_context: Context) -> None:
+        """Let air in (or out, after inflating): the bag is soft and keeps its imprint."""
+        self._pumping = False
+        if self.state is JigState.JAMMED:
+            self.bed.unjam()
+            self.state = JigState.SOFT
+            self._show_bed(root_context)
+        self.state = JigState.SOFT
+
+    def evacuate(self, root_context: Context) -> None:
+        """Start the pump; `step` freezes the bed when the pressure is nearly there."""
+        if self.state is JigState.INFLATED:
+            self.soften(root_context)
+        self._pumping = True
+
+    def press_with(self, body: RigidBody, samples: SurfaceSamples) -> None:
+        """Let the soft bed carry a body that has these surface samples (in the body frame)."""
+        self._pressing[body.scoped_name().get_full()] = (body, samples)
+
+    def release(self, body: RigidBody) -> None:
+        """Forget a body given to `press_with`."""
+        self._pressing.pop(body.scoped_name().get_full(), None)
+
+    # Simulation.
+
+    @property
+    def applied_forces(self) -> list[ExternallyAppliedSpatialForce]:
+        """Forces of the soft bed on the parts and on the base, for the plant's input port."""
+        return self._forces
+
+    def step(self, root_context: Context, dt: float) -> None:
+        """Advance by one plant step: pressure, press forces, and freezing when it is time.
+
+        Args:
+            root_context: Context of the diagram, after the plant's step.
+            dt: Step [s].
+        """
+        vacuum = self.params.vacuum
+        target = vacuum.pressure if self._pumping else 0.0
+        self.pressure += (target - self.pressure) * -np.expm1(-dt / vacuum.time_constant)
+        self.bed.vacuum = self.pressure
+        self._forces = []
+        if self.state is JigState.JAMMED:
+            return
+        self._press(root_context, dt)
+        if self.pressure >= vacuum.jam_fraction * vacuum.pressure:
+            self._jam(root_context)
+        else:
+            self._draw_if_due(root_context, dt)
+
+    def _press(self, root_context: Context, dt: float) -> None:
+        context = self._plant.GetMyContextFromRoot(root_context)
+        X_WJ = self.pose(context)
+        for body, samples in self._pressing.values():
+            X_JP, V_JP = self._motion_in_jig(context, X_WJ, body)
+            force, torque = self.bed.press(X_JP, V_JP, samples, dt)
+            if force.any():
+                self._forces += self._pair(context, X_WJ, body, force, torque)
+        self.bed.settle(dt)
+
+    def pose(self, context: Context) -> RigidTransform:
+        """Return X_WJ, given the plant's context."""
+        return self._plant.EvalBodyPoseInWorld(context, self._base) @ self._X_BJ
+
+    def _motion_in_jig(
+        self, context: Context, X_WJ: RigidTransform, body: RigidBody
+    ) -> tuple[tuple[Array, Array], tuple[Array, Array]]:
+        plant, R_JW = self._plant, X_WJ.rotation().inverse()
+        X_WP = plant.EvalBodyPoseInWorld(context, body)
+        X_JP = X_WJ.InvertAndCompose(X_WP)
+        V_WP = plant.EvalBodySpatialVelocityInWorld(context, body)
+        V_WB = plant.EvalBodySpatialVelocityInWorld(context, self._base)
+        p_WB = plant.EvalBodyPoseInWorld(context, self._base).translation()
+        V_WBp = V_WB.Shift(X_WP.translation() - p_WB)
+        w_J = R_JW @ (V_WP.rotational() - V_WBp.rotational())
+        v_J = R_JW @ (V_WP.translational() - V_WBp.translational())
+        return (X_JP.rotation().matrix(), X_JP.translation()), (w_J, v_J)
+
+    def _pair(
+        self, context: Context, X_WJ: RigidTransform, body: RigidBody, force: Array, torque: Array
+    ) -> list[ExternallyAppliedSpatialForce]:
+        """Return the force on the part at its origin and the opposite one on the base."""
+        R_WJ = X_WJ.rotation()
+        F_W = SpatialForce(R_WJ @ torque, R_WJ @ force)
+        p_WP = self._plant.EvalBodyPoseInWorld(context, body).translation()
+        X_WB = self._plant.EvalBodyPoseInWorld(context, self._base)
+        return [
+            _applied(body, np.zeros(3), F_W),
+            _applied(self._base, X_WB.inverse() @ p_WP, -F_W),
+        ]
+
+    # Freezing and drawing.
+
+    def _jam(self, root_context: Context) -> None:
+        context = self._plant.GetMyContextFromRoot(root_context)
+        self.bed.jam(self.params.vacuum.contraction)
+        self.state = JigState.JAMMED
+        X_WJ = self.pose(context)
+        hulls, lean = [], np.zeros(2)
+        for body, _ in self._pressing.values():
+            X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
+            hulls += self._bed_hulls(body, X_JP)
+            lean = _lean(X_JP.rotation())
+        self._forces = []
+        self._mesh = imprint_mesh(self.bed, self.params.jammed, hulls, lean)
+        self._install(root_context)
+
+    def _show_bed(self, root_context: Context) -> None:
+        self._forces = []
+        self._mesh = bed_mesh(self.bed, self.params.jammed)
+        self._install(root_context)
+
+    def _install(self, root_context: Context) -> None:
+        """Replace contact and visible geometry in the Context by the present mesh and surface."""
+        context = self._scene_graph.GetMyMutableContextFromRoot(root_context)
+        graph, source = self._scene_graph, self._plant.get_source_id()
+        jammed = self.params.jammed
+        frozen = self.state is JigState.JAMMED
+        gradient = jammed.pressure_gradient if frozen else jammed.soft_gradient
+        # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
+        graph.RemoveRole(context, source, self._bed_id, Role.kProximity)
+        graph.ChangeShape(context, source, self._bed_id, _shape(self._mesh))
+        graph.AssignRole(
+            context, source, self._bed_id, _proximity(self._mesh, self.params, gradient)
+        )
+        self._filter(context)
+        self._draw(context)
+
+    def _filter(self, context: Context) -> None:
+        """Exclude the bed from its own base and from what must not touch it; a swap forgets it."""
+        others = GeometrySet(self._own_geometries() + self._untouched_geometries())
+        declaration = CollisionFilterDeclaration().ExcludeBetween(GeometrySet(self._bed_id), others)
+        manager = self._scene_graph.collision_filter_manager(context)
+        if manager.has_transient_history():
+            manager.ApplyTransient(declaration)
+        else:
+            manager.Apply(declaration)
+
+    def _own_geometries(self) -> list[GeometryId]:
+        bodies = self._plant.GetBodiesWeldedTo(self._base)
+        ids = [i for body in bodies for i in self._plant.GetCollisionGeometriesForBody(body)]
+        return [i for i in ids if i != self._bed_id]
+
+    def _untouched_geometries(self) -> list[GeometryId]:
+        """Return a part's geometries that the bed must not touch: while soft, all of them."""
+        pressing = {body.index() for body, _ in self._pressing.values()}
+        untouched = []
+        for index in map(BodyIndex, range(self._plant.num_bodies())):
+            body = self._plant.get_body(index)
+            ids = self._plant.GetCollisionGeometriesForBody(body)
+            touching = [i for i in ids if self._name(i).startswith(BED_PREFIX)]
+            if not touching and index not in pressing:
+                continue
+            frozen = self.state is JigState.JAMMED
+            untouched += [i for i in ids if not (frozen and i in touching)]
+        return untouched
+
+    def _name(self, geometry: GeometryId) -> str:
+        return self._scene_graph.model_inspector().GetName(geometry).split("::")[-1]
+
+    def _bed_hulls(self, body: RigidBody, X_JP: RigidTransform) -> list[Array]:
+        inspector = self._scene_graph.model_inspector()
+        hulls = []
+        for geometry in self._plant.GetCollisionGeometriesForBody(body):
+            if self._name(geometry).startswith(BED_PREFIX):
+                vertices = _vertices(inspector.GetShape(geometry), self._name(geometry))
+                X_JG = X_JP @ inspector.GetPoseInFrame(geometry)
+                hulls.append((X_JG @ vertices.T).T)
+        return hulls
+
+    def _draw_if_due(self, root_context: Context, dt: float) -> None:
+        self._since_drawn += dt
+        if self._since_drawn >= self.params.visual_period:
+            self._draw(self._scene_graph.GetMyMutableContextFromRoot(root_context))
+
+    def _draw(self, context: Context) -> None:
+        self._since_drawn = 0.0
+        source = self._plant.get_source_id()
+        self._scene_graph.ChangeShape(context, source, self._visual_id, membrane_shape(self.bed))
+
+    # Saving.
+
+    def save_state(self) -> dict[str, Any]:
+        """Return everything that changes, except which bodies press (`press_with`)."""
+        return {
+            "bed": self.bed.state(),
+            "state": self.state.value,
+            "pressure": self.pressure,
+            "pumping": self._pumping,
+            "since_drawn": self._since_drawn,
+            "vertices": self._mesh.vertices.copy(),
+            "tetrahedra": self._mesh.tetrahedra.copy(),
+            "forces": list(self._forces),
+        }
+
+    def restore_state(self, root_context: Context, state: dict[str, Any]) -> None:
+        """Return to a saved state, also in another Context; continuing is bit-identical."""
+        self.bed.restore(state["bed"])
+        self.state = JigState(state["state"])
+        self.pressure = state["pressure"]
+        self._pumping = state["pumping"]
+        self._mesh = TetMesh(state["vertices"].copy(), state["tetrahedra"].copy())
+        self._install(root_context)
+        self._since_drawn = state["since_drawn"]
+        self._forces = list(state["forces"])
+
+
+def _shape(mesh: TetMesh) -> Mesh:
+    return Mesh(InMemoryMesh(mesh_file=MemoryFile(mesh.vtk(), ".vtk", "soft_jig_bed")))
+
+
+def _proximity(mesh: TetMesh, params: JigParameters, gradient: float) -> ProximityProperties:
+    """Return properties with the modulus that makes Drake's pressure field have this gradient."""
+    jammed = params.jammed
+    properties = ProximityProperties()
+    # The resolution hint is not used for meshes that are given as such.
+    AddCompliantHydroelasticProperties(jammed.layer, gradient * mesh.largest_depth(), properties)
+    friction = CoulombFriction(jammed.friction, jammed.friction)
+    AddContactMaterial(dissipation=jammed.dissipation, friction=friction, properties=properties)
+    return properties
+
+
+def _applied(
+    body: RigidBody, p_BoBq_B: Array, F_Bq_W: SpatialForce
+) -> ExternallyAppliedSpatialForce:
+    applied = ExternallyAppliedSpatialForce()
+    applied.body_index = body.index()
+    applied.p_BoBq_B = p_BoBq_B
+    applied.F_Bq_W = F_Bq_W
+    return applied
+
+
+def _vertices(shape: Box | Convex | Mesh, name: str) -> Array:
+    """Return the corners (n, 3) of a shape in its geometry frame."""
+    if isinstance(shape, Box):
+        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
+        return signs * shape.size() / 2
+    if isinstance(shape, Convex | Mesh):
+        hull = shape.GetConvexHull()
+        return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
+    kind = type(shape).__name__
+    raise JigError(f"Collision '{name}' is a {kind}; the bed conforms to: Box, Convex, Mesh.")
+
+
+def _lean(R_JP: RotationMatrix) -> Array:
+    """Return the horizontal shift per height of the part axis that is nearest to upright."""
+    axes = R_JP.matrix()
+    up = axes[:, np.argmax(np.abs(axes[2]))]
+    return up[:2] / up[2]
