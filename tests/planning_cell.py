@@ -1,0 +1,44 @@
+"""A planning copy of the cell for tests: two arms, tools, table, jig, motor and plate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+from pydrake.geometry import SceneGraph
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import QuaternionFloatingJoint
+
+from cell.arm import Arm, add_arm
+from cell.config import ArmConfig
+from cell.paths import model_url, new_parser
+from planning.collision_model import CollisionModel
+
+P_WJ = [0.0, 0.15, 0.20]
+TOOL_DOWN = RollPitchYaw(np.pi, 0.0, 0.0)
+LEFT = ArmConfig(p_WB=(-0.55, 0.0, 0.0), rpy_deg=(0.0, 0.0, 180.0))
+RIGHT = ArmConfig(p_WB=(0.55, 0.0, 0.0))
+
+
+def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
+    X_WJ = RigidTransform(P_WJ)
+    for name in ("table", "riser", "force_plate", "jig_base"):
+        X_WM = RigidTransform() if name == "table" else X_WJ
+        (instance,) = new_parser(plant).AddModelsFromUrl(model_url(name))
+        plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(name, instance), X_WM)
+    arms = {
+        "left": add_arm(plant, "left", "hand_e", LEFT),
+        "right": add_arm(plant, "right", "screwdriver", RIGHT),
+    }
+    for name in ("motor", "motor_plate"):
+        (instance,) = new_parser(plant).AddModelsFromUrl(model_url(name))
+        body = plant.get_body(plant.GetBodyIndices(instance)[0])
+        plant.AddJoint(
+            QuaternionFloatingJoint(f"{name}_free", plant.world_frame(), body.body_frame())
+        )
+    return arms
+
+
+def planning_cell() -> CollisionModel:
+    return CollisionModel(populate, arm_clearance=0.02, obstacle_clearance=0.005)
