@@ -136,7 +136,7 @@ def test_jaw_frames_are_where_the_grasps_expect_them() -> None:
     for name, p_MJaw in {
         "tip": [0, 0, 0.175],
         "wide": [0, 0.022, 0.175],
-        "nose": [0, 0, 0.1915],
+        "nose": [0, 0, 0.1975],
     }.items():
         X_MJaw = plant.GetFrameByName(name).CalcPoseInWorld(context)
         assert X_MJaw.IsNearlyEqualTo(RigidTransform(p_MJaw), 1e-12), name
@@ -205,9 +205,22 @@ def test_bit_turns_about_the_tool_axis_and_ends_280_mm_from_the_mount() -> None:
     X_MTip = plant.GetFrameByName("bit_tip").CalcPoseInWorld(context)
     expected = RigidTransform(RollPitchYaw(0, 0, 0.7), [0, 0, 0.28])
     assert X_MTip.IsNearlyEqualTo(expected, 1e-12)
-    assert np.isinf(plant.GetPositionUpperLimits()).all()
-    assert plant.GetEffortUpperLimits().tolist() == [1.0]
-    assert plant.CalcMassMatrix(context)[0, 0] == pytest.approx(1e-5, rel=0.01)
+    assert np.isinf(spindle.position_upper_limits()).all()
+    assert plant.GetJointActuatorByName("spindle_joint").effort_limit() == 1.0
+    inertia = plant.CalcMassMatrix(context)[spindle.velocity_start(), spindle.velocity_start()]
+    assert inertia == pytest.approx(1e-5, rel=0.01)
+
+
+def test_bit_floats_on_a_slide_along_each_axis() -> None:
+    _, plant, _ = load("screwdriver", "mount")
+    context = plant.CreateDefaultContext()
+    offset = [0.001, -0.0015, 0.004]
+    for axis, value in zip("xyz", offset, strict=True):
+        joint = plant.GetJointByName(f"float_{axis}_joint")
+        assert joint.position_lower_limits()[0] < value < joint.position_upper_limits()[0]
+        joint.set_translation(context, value)
+    p_MTip = plant.GetFrameByName("bit_tip").CalcPoseInWorld(context).translation()
+    np.testing.assert_allclose(p_MTip, np.array([0, 0, 0.28]) + offset, atol=1e-12)
 
 
 def test_end_of_the_bit_is_bare_and_its_shaft_slender() -> None:
@@ -260,7 +273,7 @@ def _room_for_shaft(query: QueryObject, p_BoltShaft: np.ndarray, closing: float)
     """Return the least room around a shaft d 6 that ends 17 mm above the seated bolt's origin."""
     c, s = np.cos(closing), np.sin(closing)
     x, y = c * p_BoltShaft[0] + s * p_BoltShaft[1], -s * p_BoltShaft[0] + c * p_BoltShaft[1]
-    nose = 0.1915 + 0.0018  # The bolt's origin, along the approach direction from the mount.
+    nose = 0.1975 + 0.0018  # The bolt's origin, along the approach direction from the mount.
     # The approach is against the bolt's z, which mirrors one lateral axis.
     return (
         min(_distance(query, [x, -y, nose - height]) for height in np.linspace(0, 0.017, 9)) - 0.003

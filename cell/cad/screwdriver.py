@@ -3,9 +3,8 @@
 The gripper that holds the driver never opens, so it and the housing are one rigid ``body``. The
 bit holder floats on two lateral slides and one axial slide with springs, as the heads of
 screwdriving robots do; the ``bit`` turns in it on ``spindle_joint`` about +z of ``mount``. The last
-10 mm of the bit have no
-collision shape: bit and socket are joined by a constraint when they meet within their tolerances,
-and the hex inside the socket would otherwise push the bolt about.
+10 mm of the bit have no collision shape: bit and socket are joined by a constraint when they meet
+within their tolerances, and the hex inside the socket would otherwise push the bolt about.
 
 Sources: lengths and masses [A], chosen so that the bit passes between bolt heads and motor shaft;
 hex size 2.5 mm for M3 [R ISO 4762]. All lengths in metres.
@@ -50,7 +49,11 @@ DRIVER_MASS = 0.45
 BIT_MASS = 0.010
 # Floating bit holder [A]: travel of commercial compliant heads is a few millimetres.
 FLOAT_MASS = 0.020  # Of each slide.
-FLOATS = (("x", (1.0, 0.0, 0.0), 0.002), ("y", (0.0, 1.0, 0.0), 0.002), ("z", (0.0, 0.0, 1.0), 0.010))
+FLOATS = (
+    ("x", (1.0, 0.0, 0.0), 0.002),
+    ("y", (0.0, 1.0, 0.0), 0.002),
+    ("z", (0.0, 0.0, 1.0), 0.010),
+)
 FLOAT_EFFORT = 50.0  # Of the springs [N].
 # Rotor and gear train seen at the spindle [A]: a 20 W driver motor of 1e-7 kg m2 behind 10:1.
 SPINDLE_INERTIA = 1e-5
