@@ -99,12 +99,22 @@ def changed(section: Section, changes: Any, path: str = "") -> Section:
 
 
 def setting_of(section: Any, info: Field) -> Setting:
-    """Return what is known about a field; from the class docstring if it is no `setting`."""
+    """Return what is known about a field.
+
+    For a field that is no `setting` the meaning is read from the class docstring, and a number
+    keeps the sign of its default: all of them are physical quantities with one meaningful sign.
+    """
     if "setting" in info.metadata:
         return info.metadata["setting"]
     text = inspect.cleandoc(type(section).__doc__ or "")
     entry = re.search(rf"^    {info.name}: (.+(?:\n {{8}}.+)*)", text, re.MULTILINE)
-    return Setting(unit="", meaning=" ".join(entry[1].split()) if entry else "")
+    meaning = " ".join(entry[1].split()) if entry else ""
+    default = getattr(type(section)(), info.name)
+    if isinstance(default, bool) or not isinstance(default, int | float):
+        return Setting(unit="", meaning=meaning)
+    if default < 0:
+        return Setting(unit="", meaning=meaning, at_most=0.0)
+    return Setting(unit="", meaning=meaning, at_least=0.0)
 
 
 def _first_leaf(path: str, value: Any) -> str:

@@ -86,6 +86,8 @@ def test_any_valid_time_step_is_kept_exactly(time_step: float) -> None:
         ("workcell.p_WJ=[0, 1]", r"must be a list of 3 numbers, for example \[0, 0.15, 0.2\]"),
         ("workcell.p_WJ=[0, 1, high]", r"'workcell.p_WJ\[2\]' must be a number"),
         ("left_arm.damping=[1, 1, 1, 1, 1, 0]", r"'left_arm.damping\[5\]' must be > 0"),
+        ("jig.vacuum.pressure=-1", "'jig.vacuum.pressure' must be >= 0, not -1"),
+        ("jig.jammed.squeeze=1e-4", "'jig.jammed.squeeze' must be <= 0"),
         ("simulation=3", "'simulation' is a section; it holds time_step"),
         ("simulation.time_step", "written key=value"),
         ("=3", "written key=value"),
