@@ -134,11 +134,11 @@ class Arm:
         """Return the joint rates (6,) [rad/s]."""
         return self.plant.GetVelocities(plant_context, self.instance)
 
-    def jacobian(self, plant_context: Context, frame: Frame) -> np.ndarray:
-        """Return J (6, 6) with V_WF = J v: angular rows first, expressed in W."""
+    def jacobian(self, plant_context: Context, frame: Frame, p_FoC: np.ndarray) -> np.ndarray:
+        """Return J (6, 6) with V_WC = J v, for the point C of F; angular rows first, in W."""
         world = self.plant.world_frame()
         jacobian = self.plant.CalcJacobianSpatialVelocity(
-            plant_context, JacobianWrtVariable.kV, frame, np.zeros(3), world, world
+            plant_context, JacobianWrtVariable.kV, frame, p_FoC, world, world
         )
         start = self.joints[0].velocity_start()
         return jacobian[:, start : start + len(JOINTS)]

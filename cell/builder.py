@@ -82,12 +82,13 @@ def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> C
     """Add the cell to a caller's diagram; with nothing else connected the arms hold."""
     plant, scene_graph = AddMultibodyPlant(_plant_config(config), builder)
     plate_weld, jig_base = add_workcell(plant, config, product)
-    left = add_arm(plant, "left", "hand_e", config.left_arm)
-    right = add_arm(plant, "right", "screwdriver", config.right_arm)
-    set_tool_gains(plant, left.tool, right.tool)
+    left, right = add_arms(plant, config)
     parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
     threads = add_threads(plant, scene_graph, product, parts, right)
     soft_jig = SoftJig.add(plant, scene_graph, jig_base, config.jig)
+    soft_jig.filters_lifted = parts.filters_lifted
+    for thread in threads.values():
+        thread.filters_lifted = parts.filters_lifted
     plant.Finalize()
     drives = {
         arm.name: Drive.connect(builder, plant, arm.instance, arm.home) for arm in (left, right)
@@ -120,6 +121,14 @@ def _plant_config(config: CellConfig) -> MultibodyPlantConfig:
         discrete_contact_approximation=config.simulation.contact_approximation,
         contact_model="hydroelastic_with_fallback",
     )
+
+
+def add_arms(plant: MultibodyPlant, config: CellConfig) -> tuple[Arm, Arm]:
+    """Add both arms with their tools."""
+    left = add_arm(plant, "left", "hand_e", config.left_arm)
+    right = add_arm(plant, "right", "screwdriver", config.right_arm)
+    set_tool_gains(plant, left.tool, right.tool)
+    return left, right
 
 
 def add_workcell(

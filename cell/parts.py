@@ -7,11 +7,12 @@ touches it or is commanded to.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet, SceneGraph
+from pydrake.geometry import CollisionFilterDeclaration, FilterId, GeometrySet, Role, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import QuaternionFloatingJoint, RigidBody
@@ -70,17 +71,27 @@ class LoosePart:
         context = self.plant.GetMyMutableContextFromRoot(root)
         self.plant.SetVelocities(context, self._with_zero_velocity(context))
         self.joint.Lock(context)
+        self.hide(root)
+
+    def wake(self, root: Context) -> None:
+        """Let the part move again, from rest."""
+        if self.asleep:
+            self.show(root)
+            self.joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
+
+    def hide(self, root: Context) -> None:
+        """Filter every contact of the part."""
         geometries = GeometrySet(self.plant.GetCollisionGeometriesForBody(self.body))
-        everything = GeometrySet(self.scene_graph.model_inspector().GetAllGeometryIds())
+        inspector = self.scene_graph.model_inspector()
+        everything = GeometrySet(inspector.GetAllGeometryIds(Role.kProximity))
         self.sleep_filter = self._filters(root).ApplyTransient(
             CollisionFilterDeclaration().ExcludeBetween(geometries, everything)
         )
 
-    def wake(self, root: Context) -> None:
-        """Let the part move again, from rest."""
+    def show(self, root: Context) -> None:
+        """Take the filter off again."""
         if self.sleep_filter is not None:
             self._filters(root).RemoveDeclaration(self.sleep_filter)
-            self.joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
             self.sleep_filter = None
 
     def _filters(self, root: Context):
@@ -105,8 +116,20 @@ class Parts:
             raise UnknownName("part in the cell", name, self.by_name)
         return self.by_name[name]
 
-    def __iter__(self):
+    def __iter__(self) -> Iterator[LoosePart]:
         return iter(self.by_name.values())
+
+    @contextmanager
+    def filters_lifted(self, root: Context) -> Iterator[None]:
+        """Lift the filters of sleeping parts: Drake forbids lasting changes of geometry roles and
+        filters while passing ones are active.
+        """
+        asleep = [part for part in self if part.asleep]
+        for part in asleep:
+            part.show(root)
+        yield
+        for part in asleep:
+            part.hide(root)
 
     def sleep_all_but(self, root: Context, awake: Iterable[str]) -> None:
         """Wake the named parts and let every other one sleep."""

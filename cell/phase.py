@@ -8,29 +8,24 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
 
 
-@dataclass(frozen=True)
-class JointPath:
-    """A timed joint trajectory, sampled once per time step.
+class Motion(Protocol):
+    """A timed joint trajectory from rest to rest."""
 
-    Attributes:
-        q: Joint angles (n, 6) [rad].
-        v: Joint rates (n, 6) [rad/s].
-    """
+    @property
+    def duration(self) -> float:
+        """Time from start to end [s]."""
+        ...
 
-    q: np.ndarray
-    v: np.ndarray
-
-    def at(self, step: int) -> tuple[np.ndarray, np.ndarray]:
-        """Return the sample of a step; the last one holds, at rest."""
-        if step < len(self.q):
-            return self.q[step], self.v[step]
-        return self.q[-1], np.zeros_like(self.v[-1])
+    def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
+        """Return joint angles (6,) [rad] and rates (6,) [rad/s]; the end holds, at rest."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -38,7 +33,8 @@ class Impedance:
     """Cartesian impedance of a frame C about a moving target D.
 
     Attributes:
-        frame: The compliance centre C, fixed to the tool.
+        frame: A frame F of the tool.
+        X_FC: Pose of the compliance centre C in F.
         X_WD: Target pose as a function of the time in the phase [s].
         stiffness: (6,) rotational [N m/rad], then translational [N/m], in the axes of W.
         limit: (6,) largest torque [N m] and force [N] of the spring, in the axes of W.
@@ -46,6 +42,7 @@ class Impedance:
     """
 
     frame: Frame
+    X_FC: RigidTransform
     X_WD: Callable[[float], RigidTransform]
     stiffness: np.ndarray
     limit: np.ndarray
@@ -63,7 +60,7 @@ class Follow:
     target: Callable[[Sensed], tuple[np.ndarray, np.ndarray]]
 
 
-ArmCommand = JointPath | Impedance | Follow
+ArmCommand = Motion | Impedance | Follow
 
 
 @dataclass(frozen=True)
@@ -90,9 +87,10 @@ class Sensed:
             tool, in W, less the reading at the start of the phase.
         jaw_opening: Distance between the tip pads [m].
         jaw_rate: Its rate [m/s].
+        bit_push: Axial force of the driver's bit holder [N].
         spindle_torque: Torque of the driver's motor [N m].
         spindle_rate: [rad/s].
-        finished: Whether every joint path of the phase has come to its end.
+        finished: Whether every motion of the phase has come to its end.
         X_WF: Pose of a frame.
         X_WP: True pose of a part (for guards and verdicts; operations read the `PoseSensor`).
     """
@@ -102,6 +100,7 @@ class Sensed:
     wrench: dict[str, np.ndarray]
     jaw_opening: float
     jaw_rate: float
+    bit_push: float
     spindle_torque: float
     spindle_rate: float
     finished: bool
@@ -112,8 +111,8 @@ class Sensed:
 Condition = Callable[[Sensed], bool]
 
 
-def path_finished(sensed: Sensed) -> bool:
-    """End condition: all joint paths are at their end."""
+def motion_finished(sensed: Sensed) -> bool:
+    """End condition: all motions are at their end."""
     return sensed.finished
 
 
@@ -137,6 +136,7 @@ class Phase:
         start: Events at the start of the phase: functions of the simulation.
         every_step: Event after every step: thread catch, for example.
         awake: Names of the parts that are awake during the phase.
+        fine_log: Log every step.
     """
 
     name: str
@@ -150,6 +150,7 @@ class Phase:
     start: tuple[Callable, ...] = ()
     every_step: Callable | None = None
     awake: frozenset[str] = frozenset()
+    fine_log: bool = False
 
 
 @dataclass(frozen=True)

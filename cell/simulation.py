@@ -6,7 +6,7 @@ import time
 from collections.abc import Iterable
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
@@ -14,8 +14,9 @@ from cell.arm import Arm
 from cell.builder import Cell
 from cell.errors import CellError
 from cell.log import Log
-from cell.phase import ArmCommand, Follow, Impedance, JointPath, Outcome, Phase, PhaseFailed, Sensed
+from cell.phase import ArmCommand, Follow, Impedance, Outcome, Phase, PhaseFailed, Sensed
 from cell.sensors import PoseSensor
+from cell.soft_jig import JigState
 
 # Damping of the Cartesian impedance uses these effective masses: dominated by the reflected rotor
 # inertia of 0.1 kg m^2 at a lever of 0.15 to 0.4 m [D].
@@ -48,11 +49,12 @@ class Simulation:
         rng = np.random.default_rng(seed)
         noise = cell.config.sensor
         self.sensor = PoseSensor(
-            cell.parts, noise.position_sigma, np.deg2rad(noise.angle_sigma_deg), rng
+            cell.parts, noise.position_noise, np.deg2rad(noise.angle_noise_deg), rng
         )
         self.log = Log()
         self.stepping_cpu = 0.0
         self.steps = 0
+        self._bed_pushes = False
         for thread in cell.threads.values():
             thread.reset(self.root)
         cell.parts.sleep_all_but(self.root, ())
@@ -79,7 +81,16 @@ class Simulation:
         self.steps += 1
         self.simulator.AdvanceTo(self.time)
         self.cell.soft_jig.step(self.root, self.time_step)
+        self.apply_bed_forces()
         self.stepping_cpu += time.process_time() - start
+
+    def apply_bed_forces(self) -> None:
+        """Hand the soft bed's forces to the plant for the next step."""
+        forces = self.cell.soft_jig.applied_forces
+        if forces or self._bed_pushes:
+            port = self.cell.plant.get_applied_spatial_force_input_port()
+            port.FixValue(self.context, forces)
+            self._bed_pushes = bool(forces)
 
     def run(self, phases: Iterable[Phase]) -> None:
         """Run an operation: a generator of phases that receives each `Outcome` back."""
@@ -167,10 +178,12 @@ class _PhaseRun:
 
     def _command_arm(self, arm: Arm, command: ArmCommand) -> None:
         drive = self.cell.drives[arm.name]
-        if isinstance(command, JointPath):
-            drive.set_target(self.root, *command.at(self.step))
-        elif isinstance(command, Follow):
-            drive.set_target(self.root, *command.target(self.last or self.sense()))
+        if isinstance(command, Follow):
+            if self.last is not None:
+                drive.set_target(self.root, *command.target(self.last))
+        elif not isinstance(command, Impedance):
+            # The implicit drive reaches the target at the end of the step.
+            drive.set_target(self.root, *command.at(self._time() + self.simulation.time_step))
         else:
             torque = impedance_torque(arm, self.simulation.context, command, self._time())
             drive.set_effort(self.root, torque)
@@ -191,19 +204,21 @@ class _PhaseRun:
             wrench=wrench,
             jaw_opening=cell.gripper.opening(context),
             jaw_rate=cell.gripper.rate(context),
+            bit_push=cell.driver.push(context),
             spindle_torque=cell.driver.torque(context),
             spindle_rate=cell.driver.rate(context),
-            finished=self._paths_finished(),
+            finished=self._motions_finished(),
             X_WF=lambda frame: frame.CalcPoseInWorld(context),
             X_WP=lambda name: cell.parts[name].X_WP(context),
         )
-        if self.simulation.steps % self.log_every == 0:
+        if self.phase.fine_log or self.simulation.steps % self.log_every == 0:
             self._log(self.last)
         return self.last
 
-    def _paths_finished(self) -> bool:
-        paths = [c for c in self.commands.values() if isinstance(c, JointPath)]
-        return all(self.step >= len(path.q) for path in paths)
+    def _motions_finished(self) -> bool:
+        commands = [c for c in self.commands.values() if c is not None]
+        motions = [c for c in commands if not isinstance(c, Follow | Impedance)]
+        return all(self._time() >= motion.duration for motion in motions)
 
     def _log(self, sensed: Sensed) -> None:
         cell, context = self.cell, self.simulation.context
@@ -220,7 +235,7 @@ class _PhaseRun:
             jaw_opening=sensed.jaw_opening,
             spindle_torque=sensed.spindle_torque,
             jig_pressure=cell.soft_jig.pressure,
-            jig_state=cell.soft_jig.state.value,
+            jig_state=list(JigState).index(cell.soft_jig.state),
         )
 
     def finish(self) -> None:
@@ -233,8 +248,9 @@ class _PhaseRun:
 
 def impedance_torque(arm: Arm, context: Context, command: Impedance, t: float) -> np.ndarray:
     """Joint torques (6,) of a Cartesian impedance with critical damping, in the axes of W."""
-    X_WC, X_WD = command.frame.CalcPoseInWorld(context), command.X_WD(t)
-    jacobian = arm.jacobian(context, command.frame)
+    X_WC = command.frame.CalcPoseInWorld(context) @ command.X_FC
+    X_WD = command.X_WD(t)
+    jacobian = arm.jacobian(context, command.frame, command.X_FC.translation())
     turn = (X_WD.rotation() @ X_WC.rotation().inverse()).ToAngleAxis()
     error = np.concatenate(
         [turn.angle() * turn.axis(), X_WD.translation() - X_WC.translation()]
@@ -244,6 +260,3 @@ def impedance_torque(arm: Arm, context: Context, command: Impedance, t: float) -
     damping = 2.0 * np.sqrt(command.stiffness * mass)
     wrench = spring - damping * (jacobian @ arm.velocities(context)) + command.bias
     return np.clip(jacobian.T @ wrench, -arm.effort_limits, arm.effort_limits)
-
-
-__all__ = ["Simulation", "impedance_torque"]

@@ -46,7 +46,7 @@ def restore_state(simulation: Simulation, state: State) -> None:
         thread.restore(
             root,
             ThreadState(str(state[f"thread/{name}/state"])),
-            int(state[f"thread/{name}/bit"]),
+            None if state[f"thread/{name}/bit"] < 0 else int(state[f"thread/{name}/bit"]),
             float(state[f"thread/{name}/caught_angle"]),
         )
     jig = {key[4:]: value for key, value in state.items() if key.startswith("jig/")}

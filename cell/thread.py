@@ -13,13 +13,14 @@ friction is lumped into the head's friction coefficient, computed from the nut f
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from pydrake.geometry import (
     CollisionFilterDeclaration,
-    FilterId,
     GeometrySet,
     SceneGraph,
 )
@@ -137,7 +138,7 @@ class Thread:
     state: ThreadState = ThreadState.FREE
     bit_position: int | None = None
     caught_angle: float = 0.0
-    filters: list[FilterId] = field(default_factory=list)
+    filters_lifted: Callable[[Context], AbstractContextManager[None]] = nullcontext
 
     def reset(self, root: Context) -> None:
         """Make the bolt loose: ties open, follower locked."""
@@ -146,6 +147,22 @@ class Thread:
             self._tie(context, tie, active=False)
         self.screw.Lock(context)
         self.state, self.bit_position = ThreadState.FREE, None
+
+    def restore(
+        self, root: Context, state: ThreadState, bit_position: int | None, caught_angle: float
+    ) -> None:
+        """Return to a saved state; the positions are restored with the plant's."""
+        self.reset(root)
+        context = self.plant.GetMyMutableContextFromRoot(root)
+        self.state, self.bit_position, self.caught_angle = state, bit_position, caught_angle
+        if state is not ThreadState.FREE:
+            self._set_inertia(context, engaged=True)
+            self._tie(context, self.thread_tie, active=True)
+            self._filter_shank(root)
+        if state is ThreadState.CAUGHT:
+            self.screw.Unlock(context)
+        if bit_position is not None:
+            self._tie(context, self.bit_ties[bit_position], active=True)
 
     def _tie(
         self, context: Context, tie: tuple[MultibodyConstraintId, ...], *, active: bool
@@ -231,14 +248,14 @@ class Thread:
 
     def _filter_shank(self, root: Context) -> None:
         """A caught shank is inside the threaded part: their contact is the thread itself."""
-        manager = self.scene_graph.collision_filter_manager(
-            self.scene_graph.GetMyMutableContextFromRoot(root)
-        )
+        context = self.scene_graph.GetMyMutableContextFromRoot(root)
         bolt = self.plant.GetCollisionGeometriesForBody(self.bolt)
         parent = self.plant.GetCollisionGeometriesForBody(self.thread_frame.body())
-        manager.Apply(
-            CollisionFilterDeclaration().ExcludeBetween(GeometrySet(bolt), GeometrySet(parent))
+        declaration = CollisionFilterDeclaration().ExcludeBetween(
+            GeometrySet(bolt), GeometrySet(parent)
         )
+        with self.filters_lifted(root):
+            self.scene_graph.collision_filter_manager(context).Apply(declaration)
 
     def lock(self, root: Context) -> None:
         """The clutch has tripped: from now on static thread friction holds the bolt."""

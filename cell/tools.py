@@ -24,6 +24,10 @@ FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 
 
+# The wide jaws stand back behind the tip pads, on both sides together [m] (see cell/cad/hand_e.py).
+JAW_SETBACK = {"tip": 0.0, "nose": 0.0, "wide": 0.024}
+
+
 @dataclass(frozen=True)
 class Gripper:
     """The parallel-jaw gripper: two coupled fingers with one force-limited drive."""

@@ -22,6 +22,8 @@ Triangle = tuple[int, int, int]
 
 # Heights closer than this are the same node [m].
 SAME_HEIGHT = 2e-5
+# How far the center of a triangle fan is moved from the middle towards its first corner.
+FAN_SHIFT = 0.3
 
 
 class BadMesh(CellError):
@@ -167,8 +169,10 @@ class ColumnMesh:
             return [(ring[0], ring[1], ring[2])]
         if len(ring) == 4:
             return [(ring[0], ring[1], ring[2]), (ring[0], ring[2], ring[3])]
-        xy = np.mean([self._nodes[i][:2] for i in ring], axis=0)
-        center = self._add([*xy, center_height])
+        middle = np.array([*np.mean([self._nodes[i][:2] for i in ring], axis=0), center_height])
+        # Drake triangulates a part's faces around their middle. Two fans with one center would
+        # overlap in every pair of triangles there, so this one has its center elsewhere.
+        center = self._add(middle + FAN_SHIFT * (self._nodes[ring[0]] - middle))
         return [(a, b, center) for a, b in _cyclic(ring)]
 
     def _side(

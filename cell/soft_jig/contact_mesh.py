@@ -40,6 +40,8 @@ RIM_HEIGHT = 0.002
 SLIVER = 1e-6
 # A body that reaches further than this over the outline's edge counts as overhead [m].
 OVERHANG = 5e-4
+# Least angle between the directions in which neighbours of the outline look outwards [rad].
+LEAST_TURN = 0.02
 # Lower walls than this are left out [m].
 LEAST_WALL = 1e-3
 
@@ -169,10 +171,22 @@ def _roof(loop: Array, foot: Array, undersides: Sequence[list[Facet]]) -> Array:
     return np.where(lower < foot + LEAST_WALL, foot, lower)
 
 
-def _outward(xy: Array) -> Array:
-    """Return unit vectors (n, 2) away from the middle of a loop."""
-    away = xy - (xy.min(axis=0) + xy.max(axis=0)) / 2
-    return away / np.linalg.norm(away, axis=1)[:, None]
+def _outward(loop: Array) -> Array:
+    """Return unit vectors (n, 2) away from the middle of a loop, fanned out in the loop's order.
+
+    Where the outline has a step, two neighbours lie on one ray or in reverse order; their
+    directions are spread so that the columns outside do not cross.
+    """
+    away = loop - (loop.min(axis=0) + loop.max(axis=0)) / 2
+    angle = np.arctan2(away[:, 1], away[:, 0])
+    step = (np.diff(angle, append=angle[0]) + np.pi) % (2 * np.pi) - np.pi
+    start = (int(np.argmax(step)) + 1) % len(loop)
+    turned = np.roll(angle, -start)[0] + np.concatenate([[0.0], np.cumsum(np.roll(step, -start))[:-1]])
+    gap = LEAST_TURN * np.arange(len(loop))
+    forward = np.maximum.accumulate(turned - gap) + gap
+    backward = np.minimum.accumulate((turned - gap)[::-1])[::-1] + gap
+    fanned = np.roll((forward + backward) / 2, start)
+    return np.column_stack([np.cos(fanned), np.sin(fanned)])
 
 
 # Columns.

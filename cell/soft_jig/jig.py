@@ -8,6 +8,8 @@ the Context, between steps; nothing here needs a new diagram.
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
 from typing import Any
 
@@ -74,6 +76,8 @@ class SoftJig:
         bed: The surface and its constitutive model.
         state: Where the jig is in INFLATED -> SOFT -> JAMMED -> SOFT.
         pressure: Confining pressure in the bag [Pa].
+        filters_lifted: Given the root context, lifts every passing collision filter for the time
+            of a swap, which Drake demands; whoever sets such filters provides it.
     """
 
     def __init__(
@@ -90,6 +94,7 @@ class SoftJig:
         self.bed = Bed(params.bag, params.soil)
         self.state = JigState.INFLATED
         self.pressure = 0.0
+        self.filters_lifted: Callable[[Context], AbstractContextManager[None]] = nullcontext
         self._pumping = False
         self._plant, self._scene_graph = plant, scene_graph
         self._base, self._X_BJ = base_body, X_BJ
@@ -259,24 +264,20 @@ class SoftJig:
         jammed = self.params.jammed
         frozen = self.state is JigState.JAMMED
         gradient = jammed.pressure_gradient if frozen else jammed.soft_gradient
-        # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
-        graph.RemoveRole(context, source, self._bed_id, Role.kProximity)
-        graph.ChangeShape(context, source, self._bed_id, _shape(self._mesh))
-        graph.AssignRole(
-            context, source, self._bed_id, _proximity(self._mesh, self.params, gradient)
-        )
-        self._filter(context)
+        properties = _proximity(self._mesh, self.params, gradient)
+        with self.filters_lifted(root_context):
+            # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
+            graph.RemoveRole(context, source, self._bed_id, Role.kProximity)
+            graph.ChangeShape(context, source, self._bed_id, _shape(self._mesh))
+            graph.AssignRole(context, source, self._bed_id, properties)
+            self._filter(context)
         self._draw(context)
 
     def _filter(self, context: Context) -> None:
         """Exclude the bed from its own base and from what must not touch it; a swap forgets it."""
         others = GeometrySet(self._own_geometries() + self._untouched_geometries())
         declaration = CollisionFilterDeclaration().ExcludeBetween(GeometrySet(self._bed_id), others)
-        manager = self._scene_graph.collision_filter_manager(context)
-        if manager.has_transient_history():
-            manager.ApplyTransient(declaration)
-        else:
-            manager.Apply(declaration)
+        self._scene_graph.collision_filter_manager(context).Apply(declaration)
 
     def _own_geometries(self) -> list[GeometryId]:
         bodies = self._plant.GetBodiesWeldedTo(self._base)

@@ -1,0 +1,32 @@
+"""Events at the start of a phase: what the cell does besides moving its arms."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from cell.simulation import Simulation
+from cell.soft_jig import SurfaceSamples
+
+Event = Callable[[Simulation], None]
+
+
+def inflate_jig(simulation: Simulation) -> None:
+    """Blow the bag up: every imprint is gone."""
+    simulation.cell.soft_jig.inflate(simulation.root)
+
+
+def soften_jig(part: str) -> Event:
+    """Let the bag go soft and carry a part that will be pressed into it."""
+
+    def event(simulation: Simulation) -> None:
+        cell = simulation.cell
+        cell.soft_jig.soften(simulation.root)
+        samples = SurfaceSamples.of(part, cell.product.parts[part].mesh)
+        cell.soft_jig.press_with(cell.parts[part].body, samples)
+
+    return event
+
+
+def evacuate_jig(simulation: Simulation) -> None:
+    """Start the vacuum pump."""
+    simulation.cell.soft_jig.evacuate(simulation.root)

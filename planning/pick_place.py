@@ -1,0 +1,118 @@
+"""Operation pick_place: a part from the tray onto the soft jig, pressed in and frozen there."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from pydrake.math import RigidTransform
+
+from cell.events import evacuate_jig, inflate_jig, soften_jig
+from cell.phase import Condition, Phase, Sensed, after, motion_finished
+from cell.soft_jig import JigState
+from planning.grasping import (
+    Reach,
+    first,
+    let_go,
+    lost_grasp,
+    reachable_grasps,
+    take,
+)
+from planning.placement import choose_placement
+from planning.station import Station
+
+LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
+PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M].
+DEEPEST = 0.025  # Pressing fails if the bed has not resisted by then [m] [A].
+RETREAT = 0.08
+JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
+SETTLE_TIME = 1.0
+
+
+def pick_place(
+    station: Station, part: str, up: str, later: tuple[str, ...] = ()
+) -> Iterator[Phase]:
+    """Yield the phases that fix a part on the jig.
+
+    Args:
+        station: The planner's view of the cell.
+        part: Name of the part.
+        up: Axis of the product frame that shall point up.
+        later: Names of the parts that will be mated with it: its yaw must suit them.
+    """
+    yield Phase(f"{part}: look", after(0.2), 1.0, start=(inflate_jig,), awake=frozenset([part]))
+    reach, placement = _choose(station, part, up, later)
+    yield from take(station, part, reach, LIFT)
+    awake, holding = frozenset([part]), lost_grasp(station.held_opening)
+    frame = station.arm("left").frame(reach.grasp.jaw)
+    # The pose in the hand is measured, not assumed: the part may have slipped in the grip.
+    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
+    X_WJaw = placement.X_WP @ X_JawP.inverse()
+    q_hover = station.configurations("left", frame, X_WJaw, placement.q, [("held", "jig_base")])
+    yield Phase(
+        f"{part}: transfer",
+        motion_finished,
+        timeout=20.0,
+        left=station.move("left", q_hover[0], [("held", "jig_base")]),
+        guard=holding,
+        awake=awake,
+    )
+    deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, DEEPEST])
+    yield Phase(
+        f"{part}: press",
+        pressed(station.config.placement.press_force),
+        timeout=DEEPEST / PRESS_SPEED,
+        left=station.line("left", frame, deep, speed=PRESS_SPEED),
+        guard=holding,
+        start=(soften_jig(part),),
+        awake=awake,
+    )
+    yield Phase(
+        f"{part}: jam",
+        jammed(station, JAM_TIME),
+        timeout=5.0,
+        guard=holding,
+        start=(evacuate_jig,),
+        awake=awake,
+    )
+    yield from let_go(station, part, reach.grasp, RETREAT, awake)
+    yield Phase(f"{part}: settle", after(SETTLE_TIME), timeout=2.0, awake=awake)
+
+
+def _choose(station: Station, part: str, up: str, later: tuple[str, ...]):
+    """Return the first grasp with a placement, nearest grasps first."""
+    X_WP = station.sense(part)
+    failure: Exception | None = None
+    for reach in _top_first(station, part, X_WP):
+        try:
+            return reach, choose_placement(station, part, up, reach, later)
+        except Exception as error:
+            failure = error
+    if failure is not None:
+        raise failure
+    return first(iter(()), part, station), None
+
+
+def _top_first(station: Station, part: str, X_WP: RigidTransform) -> Iterator[Reach]:
+    """Yield reachable grasps, those that come from above first."""
+
+    def level(grasp) -> float:
+        return float((X_WP @ grasp.X_PJaw).rotation().matrix()[2, 2])
+
+    grasps = sorted(station.part(part).grasps, key=level)
+    return reachable_grasps(station, part, X_WP, grasps)
+
+
+def pressed(force: float) -> Condition:
+    """End condition: the bed pushes the hand up with this force [N]."""
+    return lambda sensed: sensed.wrench["left"][5] >= force
+
+
+def jammed(station: Station, least: float) -> Condition:
+    """End condition: the jig is frozen and the pump has run for ``least`` [s]."""
+
+    def condition(sensed: Sensed) -> bool:
+        return sensed.time >= least and station.cell.soft_jig.state is JigState.JAMMED
+
+    return condition
+
+

@@ -1,0 +1,200 @@
+"""What operations plan with: sensed poses in, collision-free timed motions of the arms out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from pydrake.geometry import Convex, SceneGraph
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import Frame, SpatialInertia
+from pydrake.systems.framework import Context
+
+from cell.arm import Arm
+from cell.builder import Cell, add_arms, add_workcell
+from cell.config import CellConfig
+from cell.parts import add_parts
+from cell.product import Part, Product
+from planning.collision_model import CollisionModel, Surroundings
+from planning.kinematics import ik_solutions, tool_pose
+from planning.motion import plan_line, plan_path
+from planning.timing import JointMotion, time_path
+
+
+
+def collision_model(config: CellConfig, product: Product) -> CollisionModel:
+    """Return the planning copy of a cell, with the inflated bag as an obstacle."""
+
+    def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
+        _, jig_base = add_workcell(plant, config, product)
+        plant.RegisterCollisionGeometry(
+            jig_base, RigidTransform(), _cap(config), "bag", CoulombFriction(1.0, 1.0)
+        )
+        left, right = add_arms(plant, config)
+        add_parts(plant, scene_graph, product, config.workcell.X_WT)
+        return {"left": left, "right": right}
+
+    motion = config.motion
+    return CollisionModel(
+        populate,
+        arm_clearance=motion.arm_clearance,
+        obstacle_clearance=motion.obstacle_clearance,
+    )
+
+
+def _cap(config: CellConfig) -> Convex:
+    """Return the convex hull of the inflated bag, in J."""
+    bag = config.jig.bag
+    angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
+    rings = []
+    for height in np.linspace(0.0, bag.cap_height, 5):
+        below_centre = bag.cap_radius - bag.cap_height + height
+        radius = np.sqrt(max(bag.cap_radius**2 - below_centre**2, 0.0))
+        ring = [radius * np.cos(angles), radius * np.sin(angles), np.full(16, height)]
+        rings.append(np.array(ring))
+    return Convex(points=np.hstack(rings), label="bag")
+
+
+@dataclass
+class Station:
+    """The planner's view of a running cell.
+
+    Attributes:
+        cell: The cell.
+        context: Plant context, only read: joint angles of arms and tools.
+        sense: Returns the sensed pose X_WP of a part.
+        seed: Seeds every sampling planner, together with the number of the call.
+        model: The planning copy.
+        held: Name of the part in the left hand; None when it is empty.
+        held_opening: Opening of the tip pads when it was gripped [m].
+    """
+
+    cell: Cell
+    context: Context
+    sense: Callable[[str], RigidTransform]
+    seed: int
+    model: CollisionModel = field(init=False)
+    held: str | None = None
+    held_opening: float = 0.0
+    _calls: int = 0
+
+    def __post_init__(self) -> None:
+        self.model = collision_model(self.cell.config, self.cell.product)
+
+    @property
+    def config(self) -> CellConfig:
+        """Configuration of the cell."""
+        return self.cell.config
+
+    def part(self, name: str) -> Part:
+        """Return a part's description."""
+        return self.cell.product.parts[name]
+
+    def arm(self, name: str) -> Arm:
+        """Return an arm."""
+        return self.cell.arms[name]
+
+    def pose(self, arm: str, frame: str) -> RigidTransform:
+        """Return the pose of a tool frame as it is now."""
+        return self.arm(arm).frame(frame).CalcPoseInWorld(self.context)
+
+    def surroundings(self, may_touch: Iterable[tuple[str, str]] = ()) -> Surroundings:
+        """Return everything as it is sensed now."""
+        plant, cell = self.cell.plant, self.cell
+        names = [part.part.name for part in cell.parts]
+        X_WHand = self.pose("left", "tip")
+        held = {} if self.held is None else {self.held: X_WHand.inverse() @ self.sense(self.held)}
+        return Surroundings(
+            arms={arm.name: arm.positions(self.context) for arm in cell.arms.values()},
+            tools={"left_tool": plant.GetPositions(self.context, cell.left.tool)},
+            X_WP={name: self.sense(name) for name in names if name != self.held},
+            X_HandP=held,
+            may_touch=tuple(may_touch),
+        )
+
+    def configurations(
+        self,
+        arm: str,
+        frame: Frame,
+        X_WF: RigidTransform,
+        near: np.ndarray,
+        may_touch: Iterable[tuple[str, str]] = (),
+    ) -> list[np.ndarray]:
+        """Return the collision-free joint angles that put a tool frame at a pose, nearest first."""
+        self.model.arrange(self.surroundings(may_touch))
+        solutions = ik_solutions(self.arm(arm), self.context, frame, X_WF, near)
+        return [q for q in solutions if self.model.is_free(arm, q)]
+
+    def move(
+        self, arm: str, q_goal: np.ndarray, may_touch: Iterable[tuple[str, str]] = ()
+    ) -> JointMotion:
+        """Return a collision-free motion from where the arm is to ``q_goal`` (6,)."""
+        self.model.arrange(self.surroundings(may_touch))
+        self._calls += 1
+        path = plan_path(
+            self.model,
+            arm,
+            self.arm(arm).positions(self.context),
+            q_goal,
+            seed=self.seed * 1009 + self._calls,
+            max_iterations=self.config.motion.max_iterations,
+        )
+        return self._timed(arm, path)
+
+    def line(
+        self,
+        arm: str,
+        frame: Frame,
+        X_WGoal: RigidTransform,
+        *,
+        speed: float,
+        q_start: np.ndarray | None = None,
+    ) -> JointMotion:
+        """Return the motion that takes a tool frame straight to a pose.
+
+        Only the arms are kept apart on it: it is meant for the last stretch before a contact.
+
+        Args:
+            arm: Name of the arm.
+            frame: Of its tool.
+            X_WGoal: Where the frame goes.
+            speed: Largest mean speed of the frame's origin [m/s].
+            q_start: (6,) where it begins; None: where the arm is.
+        """
+        arm_ = self.arm(arm)
+        q_start = arm_.positions(self.context) if q_start is None else q_start
+        self.model.arrange(self.surroundings([(f"{arm}_tool", "*"), ("held", "*")]))
+        path = plan_line(arm_, self.context, frame, q_start, X_WGoal)
+        start = tool_pose(arm_, self.context, frame, q_start)
+        distance = float(np.linalg.norm(X_WGoal.translation() - start.translation()))
+        return slowed(self._timed(arm, path), distance / speed)
+
+    def _timed(self, arm: str, path) -> JointMotion:
+        motion = self.config.motion
+        return time_path(
+            self.arm(arm),
+            self.context,
+            path,
+            velocity_scale=motion.velocity_scale,
+            acceleration_limit=motion.acceleration_limit,
+            payload=self._payload() if arm == "left" else None,
+        )
+
+    def _payload(self) -> SpatialInertia | None:
+        """Return what hangs on the left hand, about and in its flange frame."""
+        if self.held is None:
+            return None
+        plant = self.cell.plant
+        flange = plant.GetFrameByName("flange", self.cell.left.instance)
+        body = self.cell.parts[self.held].body
+        return plant.CalcSpatialInertia(self.context, flange, [body.index()])
+
+
+def slowed(motion: JointMotion, duration: float) -> JointMotion:
+    """Return the motion stretched to last at least ``duration`` [s]."""
+    factor = duration / motion.duration if motion.duration > 0 else 1.0
+    if factor <= 1.0:
+        return motion
+    return replace(motion, time=motion.time * factor, v=motion.v / factor)
