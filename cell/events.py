@@ -19,12 +19,17 @@ def soften_jig(part: str) -> Event:
     """Let the bag go soft and carry a part that will be pressed into it."""
 
     def event(simulation: Simulation) -> None:
-        cell = simulation.cell
-        cell.soft_jig.soften(simulation.root)
-        samples = SurfaceSamples.of(part, cell.product.parts[part].mesh)
-        cell.soft_jig.press_with(cell.parts[part].body, samples)
+        simulation.cell.soft_jig.soften(simulation.root)
+        press_into_bed(simulation, part)
 
     return event
+
+
+def press_into_bed(simulation: Simulation, part: str) -> None:
+    """Let the soft bed carry a part by its real surface."""
+    cell = simulation.cell
+    samples = SurfaceSamples.of(part, cell.product.parts[part].mesh)
+    cell.soft_jig.press_with(cell.parts[part].body, samples)
 
 
 def evacuate_jig(simulation: Simulation) -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 import trimesh
 from pydrake.math import RigidTransform
 
@@ -83,6 +84,23 @@ class Fastener:
 
 
 @dataclass(frozen=True)
+class Fit:
+    """A shaft or boss of one part in a hole of another, in the assembled product.
+
+    Attributes:
+        shaft: Name of the part with the shaft.
+        hole: Name of the part with the hole.
+        p_AoF: Centre F of the hole's mouth, where the shaft enters, in the product frame A [m].
+        depth: Length of the fit [m]: how far before the seat the shaft meets the hole.
+    """
+
+    shaft: str
+    hole: str
+    p_AoF: np.ndarray
+    depth: float
+
+
+@dataclass(frozen=True)
 class Product:
     """Parts in assembled poses, with groups, fasteners and assembly orders.
 
@@ -92,6 +110,7 @@ class Product:
         groups: Group name -> names of its parts; a group is one item of an assembly order.
         orders: Assembly orders, each a tuple of part or group names; the first is the default.
         fasteners: By the name of the bolt.
+        fits: Shafts in holes.
         up: Axis of the product frame that points up on the jig: "+x" ... "-z".
         contact_tolerance: Gap up to which two parts count as touching [m].
         tray: Name of the SDF model of the tray that presents the parts, if there is one.
@@ -102,6 +121,7 @@ class Product:
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
     fasteners: Mapping[str, Fastener] = field(default_factory=dict)
+    fits: tuple[Fit, ...] = ()
     up: str = "+z"
     contact_tolerance: float = 5e-5
     tray: str | None = None

@@ -12,7 +12,7 @@ import yaml
 from cell.errors import BadOrder, CellError
 from cell.fields import Fields, names_at, one_of
 from cell.part_yaml import model_name, read_part
-from cell.product import Fastener, Part, Product
+from cell.product import Fastener, Fit, Part, Product
 
 PRODUCT_KEYS = (
     "name",
@@ -24,6 +24,7 @@ PRODUCT_KEYS = (
     "groups",
     "orders",
     "fasteners",
+    "fits",
 )
 FASTENER_KEYS = (
     "into",
@@ -35,6 +36,7 @@ FASTENER_KEYS = (
     "torque_Nm",
     "nut_factor",
 )
+FIT_KEYS = ("shaft", "hole", "at_mm", "depth_mm")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -50,6 +52,7 @@ def read_product(file: Path) -> Product:
     product = Product(fields.text("name") if "name" in fields else file.stem, parts)
     product = replace(product, groups=_groups(fields, parts))
     product = replace(product, fasteners=_fasteners(fields, product))
+    product = replace(product, fits=_fits(fields, product))
     product = replace(product, orders=_orders(fields, product))
     return replace(product, **_settings(fields))
 
@@ -153,4 +156,26 @@ def _fastener(part: str, fields: Fields, product: Product) -> Fastener:
         thread_depth=fields.positive("thread_depth_mm") * 1e-3,
         torque=fields.positive("torque_Nm"),
         nut_factor=fields.positive("nut_factor"),
+    )
+
+
+def _fits(fields: Fields, product: Product) -> tuple[Fit, ...]:
+    """Return the fits of shafts in holes."""
+    if "fits" not in fields:
+        return ()
+    entries = fields.raw("fits")
+    if not isinstance(entries, list):
+        raise CellError(f"{fields.where}.fits: expected a list of fits, got {entries!r}.")
+    where = f"{fields.where}: fits"
+    return tuple(
+        _fit(Fields(data, f"{where}[{k}]", FIT_KEYS), product) for k, data in enumerate(entries)
+    )
+
+
+def _fit(fields: Fields, product: Product) -> Fit:
+    return Fit(
+        shaft=one_of("part", fields.text("shaft"), list(product.parts)),
+        hole=one_of("part", fields.text("hole"), list(product.parts)),
+        p_AoF=fields.vector("at_mm") * 1e-3,
+        depth=fields.positive("depth_mm") * 1e-3,
     )

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import ast
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cell.events import press_into_bed
 from cell.simulation import Simulation
 from cell.thread import ThreadState
 
@@ -29,14 +31,36 @@ def save_state(simulation: Simulation) -> State:
         state[f"{name}/torque_drive"] = np.array(arm.in_torque_drive())
     for part in cell.parts:
         state[f"asleep/{part.part.name}"] = np.array(part.asleep)
+        state[f"pressing/{part.part.name}"] = np.array(part.body in cell.soft_jig.pressing)
     for name, thread in cell.threads.items():
         state[f"thread/{name}/state"] = np.array(thread.state.value)
         state[f"thread/{name}/caught_angle"] = np.array(thread.caught_angle)
         bit = -1 if thread.bit_position is None else thread.bit_position
         state[f"thread/{name}/bit"] = np.array(bit)
-    for name, value in cell.soft_jig.save_state().items():
-        state[f"jig/{name}"] = np.array(value)
+    state.update(_flat(cell.soft_jig.save_state(), "jig"))
     return state
+
+
+def _flat(nested: Mapping[str, Any], prefix: str) -> State:
+    """Return nested dictionaries as one, with paths for names."""
+    flat: State = {}
+    for name, value in nested.items():
+        path = f"{prefix}/{name}"
+        flat.update(_flat(value, path) if isinstance(value, Mapping) else {path: np.array(value)})
+    return flat
+
+
+def _nested(flat: State, prefix: str) -> dict[str, Any]:
+    """Undo `_flat` for the names under a prefix."""
+    nested: dict[str, Any] = {"bed": {"reference": {}}}
+    for path, value in flat.items():
+        if path.startswith(f"{prefix}/"):
+            *folders, name = path.split("/")[1:]
+            here = nested
+            for folder in folders:
+                here = here.setdefault(folder, {})
+            here[name] = value
+    return nested
 
 
 def restore_state(simulation: Simulation, state: State) -> None:
@@ -49,10 +73,13 @@ def restore_state(simulation: Simulation, state: State) -> None:
             None if state[f"thread/{name}/bit"] < 0 else int(state[f"thread/{name}/bit"]),
             float(state[f"thread/{name}/caught_angle"]),
         )
-    jig = {key[4:]: value for key, value in state.items() if key.startswith("jig/")}
-    cell.soft_jig.restore_state(root, jig)
     for part in cell.parts:
         part.wake(root)
+        if state[f"pressing/{part.part.name}"]:
+            press_into_bed(simulation, part.part.name)
+    cell.soft_jig.restore_state(root, _nested(state, "jig"))
+    simulation.apply_bed_forces()
+    for part in cell.parts:
         if state[f"asleep/{part.part.name}"]:
             part.sleep(root)
     for name, arm in cell.arms.items():

@@ -136,7 +136,7 @@ class Bed:
         p_PQ_J = under.points @ R_JP.T
         n = len(self.axis)
         # One whole-cell shift for the part: its bins then cover the cells without gap or overlap.
-        shift = np.rint((p_JP[:2] - self.axis[0]) / self.bag.cell + 0.5)
+        shift = np.rint((p_JP[:2] - self.axis[0]) / self.bag.cell)
         # The border of the grid lies outside the aperture, so clipping drops points, not moves them.
         column = np.clip(under.bins + shift, 0, n - 1).astype(np.int64)
         flat = column[:, 0] * n + column[:, 1]

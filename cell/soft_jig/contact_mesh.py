@@ -53,7 +53,8 @@ def bed_mesh(bed: Bed, params: JammedParameters) -> TetMesh:
     loop = list(range(RAYS))
     tops = bed.height_at(circle)
     floor = [_floor_column(loop, circle, tops, float(bed.height_at(np.zeros((1, 2)))[0]), params)]
-    return _with_rings(bed, params, circle, floor, loop, tops, np.zeros(2))
+    roof = np.full((RAYS, 2), np.inf)
+    return _with_rings(bed, params, circle, floor, loop, roof, np.zeros(2))
 
 
 def imprint_mesh(
@@ -79,12 +80,20 @@ def imprint_mesh(
         _floor_column(cell, plane, top, float(top.mean()), params)
         for cell, top in zip(cells, tops, strict=True)
     ]
-    foot = {
-        i: z for cell, top in zip(cells, tops, strict=True) for i, z in zip(cell, top, strict=True)
-    }
-    roof = _roof(plane[loop], np.array([foot[i] for i in loop]), undersides)
+    foot = _edge_feet(floor, loop)
+    roof = _roof(plane[loop], foot, undersides)
     lean = np.zeros(2) if lean is None else lean
     return _with_rings(bed, params, plane, floor, loop, roof, lean)
+
+
+def _edge_feet(floor: Sequence[Column], loop: Sequence[int]) -> Array:
+    """Return the floor's height at both ends of each edge of the outline (n, 2)."""
+    height = {
+        edge: (column.tops[k], column.tops[(k + 1) % len(column.tops)])
+        for column in floor
+        for k, edge in enumerate(_edges(column.corners))
+    }
+    return np.array([height[edge] for edge in _edges(list(loop))])
 
 
 # Where the part touches.
@@ -129,14 +138,25 @@ def _touching_facets(bed: Bed, undersides: Sequence[list[Facet]]) -> list[Facet]
     facets: list[Facet] = []
     lower: list[Array] = []
     for underside in undersides:
+        curved = len(underside) > 2
         for facet in underside:
-            piece = clip(facet.polygon, window)
-            pieces = [piece] if len(piece) and area(piece) > SLIVER else []
+            if curved:
+                pieces = [facet.polygon] if _mostly_touches(facet, underside, xy, surface) else []
+            else:
+                piece = clip(facet.polygon, window)
+                pieces = [piece] if len(piece) and area(piece) > SLIVER else []
             for footprint in lower:
                 pieces = [rest for piece in pieces for rest in subtract(piece, footprint)]
             facets += [replace(facet, polygon=piece) for piece in pieces if len(piece)]
         lower.append(_silhouette(underside))
     return facets
+
+
+def _mostly_touches(facet: Facet, underside: list[Facet], xy: Array, surface: Array) -> bool:
+    """Say whether the bed touches most of a facet; a curved body's facets are kept or left whole."""
+    over = contains(facet.polygon, xy)
+    touching = _envelope([underside], xy[over]) < surface[over]
+    return bool(over.any() and touching.mean() > 0.5)
 
 
 def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) -> Array:
@@ -148,7 +168,9 @@ def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) 
     step, margin, clear = 0.25e-3, 0.5e-3, 4 * bed.bag.cell
     reach = np.arange(step, 2 * bed.bag.aperture_radius, step)
     window = []
-    for angle in (np.arange(RAYS) + 0.5) * 2 * np.pi / RAYS:
+    corners = np.concatenate([_silhouette(body) for body in undersides]) - center
+    spread = (np.arange(RAYS) + 0.5) * 2 * np.pi / RAYS
+    for angle in np.concatenate([spread, np.arctan2(corners[:, 1], corners[:, 0])]):
         ray = np.array([np.cos(angle), np.sin(angle)])
         xy = center + reach[:, None] * ray
         height = _envelope(undersides, xy)
@@ -160,28 +182,35 @@ def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) 
 
 
 def _roof(loop: Array, foot: Array, undersides: Sequence[list[Facet]]) -> Array:
-    """Return how high the bed may stand beside the outline (n,) [m]: what hangs over it, if any.
+    """Return how high the bed may stand at both ends of each edge of the outline (n, 2) [m].
 
-    Along an edge where the contact ends under the part, the bed beside it stays at the floor.
+    That is what hangs over the place beside the edge, if any. Where the contact ends under the
+    part itself there is no wall, and the roof is the floor.
     """
     normal, _ = edge_normals(loop)
     beside = (loop + np.roll(loop, -1, axis=0)) / 2 + OVERHANG * normal
-    overhead = _envelope(undersides, beside)
-    lower = np.minimum(overhead, np.roll(overhead, 1))
-    return np.where(lower < foot + LEAST_WALL, foot, lower)
+    overhead = _envelope(undersides, beside)[:, None]
+    return np.where(overhead < foot + LEAST_WALL, foot, overhead)
 
 
 def _outward(loop: Array) -> Array:
     """Return unit vectors (n, 2) away from the middle of a loop, fanned out in the loop's order.
 
-    Where the outline has a step, two neighbours lie on one ray or in reverse order; their
-    directions are spread so that the columns outside do not cross.
+    They point out of both edges at a vertex, and where the outline has a step the directions are
+    spread, so that the columns outside do not cross.
     """
     away = loop - (loop.min(axis=0) + loop.max(axis=0)) / 2
+    away /= np.linalg.norm(away, axis=1)[:, None]
+    normal, _ = edge_normals(loop)
+    for side in (normal, np.roll(normal, 1, axis=0)) * 2:
+        short = np.maximum(3 * LEAST_TURN - np.einsum("ij,ij->i", away, side), 0.0)
+        away += short[:, None] * side
     angle = np.arctan2(away[:, 1], away[:, 0])
     step = (np.diff(angle, append=angle[0]) + np.pi) % (2 * np.pi) - np.pi
     start = (int(np.argmax(step)) + 1) % len(loop)
-    turned = np.roll(angle, -start)[0] + np.concatenate([[0.0], np.cumsum(np.roll(step, -start))[:-1]])
+    turned = np.roll(angle, -start)[0] + np.concatenate(
+        [[0.0], np.cumsum(np.roll(step, -start))[:-1]]
+    )
     gap = LEAST_TURN * np.arange(len(loop))
     forward = np.maximum.accumulate(turned - gap) + gap
     backward = np.minimum.accumulate((turned - gap)[::-1])[::-1] + gap
@@ -217,34 +246,45 @@ def _with_rings(
     n, count = len(plane), len(loop)
     rings = [loop, list(range(n, n + count)), list(range(n + count, n + 2 * count))]
     points = np.concatenate([plane, middle, outer])
-    foot = {i: z for column in floor for i, z in zip(column.corners, column.tops, strict=True)}
-    floor_top = np.array([foot[i] for i in loop])
+    foot = _edge_feet(floor, loop)
     # The first cells around an imprint are half in it.
-    beside = inner + away * 1.5 * bed.bag.cell
-    tops = [np.maximum(np.minimum(bed.height_at(beside), roof), floor_top)]
-    for ring in (middle, outer):
-        tops.append(np.maximum(np.minimum(bed.height_at(ring), roof), RIM_HEIGHT))
+    beside = bed.height_at(inner + away * 1.5 * bed.bag.cell)
+    beside = np.column_stack([beside, np.roll(beside, -1)])
+    lowest_roof = np.minimum(roof[:, 0], np.roll(roof[:, 1], 1))
+    rim = np.maximum(np.minimum(beside, roof), foot)
+    lowered = np.minimum(rim, np.column_stack([lowest_roof, np.roll(lowest_roof, -1)]))
+    # The bed beside an edge is above the floor or below it, never one at each end.
+    crossing = np.any(lowered > foot, axis=1) & np.any(lowered < foot, axis=1)
+    rim = np.where(crossing[:, None], rim, lowered)
+    ring_tops = [
+        np.maximum(np.minimum(bed.height_at(ring), lowest_roof), RIM_HEIGHT)
+        for ring in (middle, outer)
+    ]
+    ring_tops = [np.column_stack([top, np.roll(top, -1)]) for top in ring_tops]
+    tops, feet = [rim, *ring_tops], [foot, None]
     columns = list(floor)
-    for level in (0, 1):
+    for level, wall in enumerate(feet):
         for k in range(count):
             j = (k + 1) % count
             corners = [rings[level][k], rings[level + 1][k], rings[level + 1][j], rings[level][j]]
-            top = np.array([tops[level][k], tops[level + 1][k], tops[level + 1][j], tops[level][j]])
-            wall = [foot[corners[0]], foot[corners[3]]] if level == 0 else []
-            columns.append(_ring_column(corners, points, top, wall, params))
+            (a, d), (b, c) = tops[level][k], tops[level + 1][k]
+            top = np.array([a, b, c, d])
+            columns.append(
+                _ring_column(corners, points, top, wall if wall is None else wall[k], params)
+            )
     return ColumnMesh(points, columns, lean).build()
 
 
 def _ring_column(
-    corners: list[int], plane: Array, tops: Array, foot: list[float], params: JammedParameters
+    corners: list[int], plane: Array, tops: Array, foot: Array | None, params: JammedParameters
 ) -> Column:
     """Return a column whose apex lies behind the middle of its wall, one layer below its top."""
     xy = plane[corners].mean(axis=0)
     # Both triangles of the top face must be seen from below.
     top = min(_plane_height(plane, corners, tops, three, xy) for three in ([0, 1, 2], [0, 2, 3]))
     height = top - min(params.layer, top / 2)
-    if foot:
-        height = min(height, (float(np.mean(foot)) + top) / 2)
+    if foot is not None:
+        height = min(height, (float(foot.mean()) + top) / 2)
     return Column(corners, tops, top, np.array([*xy, height]))
 
 

@@ -168,6 +168,11 @@ class SoftJig:
         """Forget a body given to `press_with`."""
         self._pressing.pop(body.scoped_name().get_full(), None)
 
+    @property
+    def pressing(self) -> tuple[RigidBody, ...]:
+        """The bodies that the soft bed carries."""
+        return tuple(body for body, _ in self._pressing.values())
+
     # Simulation.
 
     @property
@@ -333,19 +338,23 @@ class SoftJig:
             "since_drawn": self._since_drawn,
             "vertices": self._mesh.vertices.copy(),
             "tetrahedra": self._mesh.tetrahedra.copy(),
-            "forces": list(self._forces),
+            "forces": np.array([_as_row(force) for force in self._forces]).reshape(-1, 10),
         }
 
     def restore_state(self, root_context: Context, state: dict[str, Any]) -> None:
         """Return to a saved state, also in another Context; continuing is bit-identical."""
         self.bed.restore(state["bed"])
-        self.state = JigState(state["state"])
-        self.pressure = state["pressure"]
-        self._pumping = state["pumping"]
+        self.state = JigState(str(state["state"]))
+        self.pressure = float(state["pressure"])
+        self._pumping = bool(state["pumping"])
         self._mesh = TetMesh(state["vertices"].copy(), state["tetrahedra"].copy())
         self._install(root_context)
-        self._since_drawn = state["since_drawn"]
-        self._forces = list(state["forces"])
+        self._since_drawn = float(state["since_drawn"])
+        self._forces = [self._from_row(row) for row in state["forces"]]
+
+    def _from_row(self, row: Array) -> ExternallyAppliedSpatialForce:
+        body = self._plant.get_body(BodyIndex(int(row[0])))
+        return _applied(body, row[1:4], SpatialForce(row[4:7], row[7:10]))
 
 
 def _shape(mesh: TetMesh) -> Mesh:
@@ -371,6 +380,19 @@ def _applied(
     applied.p_BoBq_B = p_BoBq_B
     applied.F_Bq_W = F_Bq_W
     return applied
+
+
+def _as_row(applied: ExternallyAppliedSpatialForce) -> Array:
+    """Return body index, p_BoBq_B, torque and force in one row (10,)."""
+    F_Bq_W = applied.F_Bq_W
+    return np.concatenate(
+        [
+            [float(int(applied.body_index))],
+            applied.p_BoBq_B,
+            F_Bq_W.rotational(),
+            F_Bq_W.translational(),
+        ]
+    )
 
 
 def _vertices(shape: Box | Convex | Mesh, name: str) -> Array:

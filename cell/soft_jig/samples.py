@@ -74,7 +74,7 @@ class SurfaceSamples:
         facing = self.normals @ R_JP[2]
         down = facing < -0.02
         p_J, normals_J = self.points[down] @ R_JP.T, self.normals[down] @ R_JP.T
-        bins = np.floor(p_J[:, :2] / bin_size).astype(np.int64)
+        bins = np.rint(p_J[:, :2] / bin_size).astype(np.int64)
         order = np.lexsort((p_J[:, 2], bins[:, 1], bins[:, 0]))
         p_J, normals_J, bins = p_J[order], normals_J[order], bins[order]
         starts = np.flatnonzero(np.append(True, np.any(bins[1:] != bins[:-1], axis=1)))

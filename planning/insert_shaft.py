@@ -1,0 +1,226 @@
+"""Operation insert_shaft: a part with a hole onto the shaft of the part that the jig holds.
+
+The hand carries the part over the shaft, then goes soft: an impedance centred on the hole lets it
+comply sideways and tilt, pushes with a limited force, and searches on a spiral if the shaft has not
+found the hole. Seated means that gap and tilt are both small, and is measured, not assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cell.config import InsertionConfig
+from cell.phase import Impedance, Outcome, Phase, Sensed, motion_finished
+from cell.product import Fit
+from planning.grasping import (
+    HAND_SPEED,
+    first,
+    let_go,
+    lost_grasp,
+    reachable_grasps,
+    take,
+)
+from planning.station import Station
+
+LIFT = 0.12
+ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].
+NEAR = 0.002  # The hand goes soft this far before shaft and hole can meet [m] [A].
+BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand presses [m] [A].
+RETREAT = 0.08
+STALL_SPEED = 5e-4  # Slower than this is standing [m/s].
+STALL_TIME = 0.25
+SEATED_GAP = 2e-4  # Largest gap that counts as seated [m].
+SEATED_TILT = np.deg2rad(1.0)
+YAW_STIFFNESS = 40.0  # About the axis of the hole; the bolt holes must meet [N m/rad] [A].
+LATERAL_LIMIT = 15.0  # [N] [A]
+TORQUE_LIMIT = 1.0  # [N m] [A]
+TOO_MUCH = 30.0  # Insertion fails above this force [N].
+
+
+@dataclass
+class Stalled:
+    """End condition: a tool point has stood still for a while."""
+
+    position: Callable[[Sensed], np.ndarray]
+    _since: float = 0.0
+    _last: np.ndarray | None = field(default=None)
+
+    def __call__(self, sensed: Sensed) -> bool:
+        """Return whether the point has moved less than the stall speed for the stall time."""
+        here = self.position(sensed)
+        if self._last is None or np.linalg.norm(here - self._last) > STALL_SPEED * STALL_TIME:
+            self._last, self._since = here, sensed.time
+        return sensed.time - self._since >= STALL_TIME
+
+
+def insert_shaft(station: Station, fit: Fit) -> Iterator[Phase]:
+    """Yield the phases that put the part with the hole onto the shaft and let it go.
+
+    Args:
+        station: The planner's view of the cell.
+        fit: Which shaft, which hole, and where they meet.
+    """
+    part, held = fit.hole, frozenset([fit.hole])
+    both = frozenset([fit.hole, fit.shaft])
+    X_WGoal = goal_pose(station, fit)
+    reach = first(_useful(station, fit, X_WGoal), part, station)
+    yield from take(station, part, reach, LIFT)
+    jaw = station.arm("left").frame(reach.grasp.jaw)
+    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
+    holding = lost_grasp(station.held_opening)
+    above = raised(X_WGoal, ABOVE) @ X_JawP.inverse()
+    (q_above, *_) = station.configurations("left", jaw, above, reach.q_before, [("held", "*")])
+    yield Phase(
+        f"{part}: transfer",
+        motion_finished,
+        timeout=20.0,
+        left=station.move("left", q_above),
+        guard=holding,
+        awake=held,
+    )
+    # Once more with the part over its place: it may have turned in the grip on the way.
+    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
+    X_WGoal = goal_pose(station, fit)
+    near = raised(X_WGoal, fit.depth + NEAR) @ X_JawP.inverse()
+    yield Phase(
+        f"{part}: align",
+        motion_finished,
+        timeout=10.0,
+        left=station.line("left", jaw, near, speed=HAND_SPEED / 2),
+        guard=holding,
+        awake=held,
+    )
+    yield from _insert(station, fit, X_WGoal, jaw, X_JawP, both)
+    yield from let_go(station, part, reach.grasp, RETREAT, both)
+
+
+def goal_pose(station: Station, fit: Fit) -> RigidTransform:
+    """Return the sensed pose X_WP at which the part with the hole is seated."""
+    shaft, hole = station.part(fit.shaft), station.part(fit.hole)
+    return station.sense(fit.shaft) @ shaft.X_AP.inverse() @ hole.X_AP
+
+
+def raised(X_WP: RigidTransform, height: float) -> RigidTransform:
+    """Return the pose moved up along +z of W."""
+    return RigidTransform(X_WP.rotation(), X_WP.translation() + [0.0, 0.0, height])
+
+
+def _useful(station: Station, fit: Fit, X_WGoal: RigidTransform):
+    """Yield grasps of the part in the tray with which the hand also fits over the shaft."""
+    part = station.part(fit.hole)
+    for reach in reachable_grasps(station, part.name, station.sense(part.name), part.grasps):
+        jaw = station.arm("left").frame(reach.grasp.jaw)
+        goals = [raised(X_WGoal, height) @ reach.grasp.X_PJaw for height in (ABOVE, 0.0)]
+        may_touch = [("left_tool", part.name), ("held", "*")]
+        if all(
+            station.configurations("left", jaw, X, reach.q_before, may_touch) for X in goals
+        ) and _comes_along(X_WGoal, reach.grasp.X_PJaw):
+            yield reach
+
+
+def _comes_along(X_WP: RigidTransform, X_PJaw: RigidTransform) -> bool:
+    """Return whether the hand points down the mating direction: it must not meet the target."""
+    return bool((X_WP @ X_PJaw).rotation().matrix()[2, 2] < -0.9)
+
+
+def _insert(
+    station: Station,
+    fit: Fit,
+    X_WGoal: RigidTransform,
+    jaw,
+    X_JawP: RigidTransform,
+    awake: frozenset[str],
+) -> Iterator[Phase]:
+    """Yield the soft phases: insert, search if it did not go in, press."""
+    config = station.config.insertion
+    # C: the compliance centre, at the mouth of the hole, with the axes of the part.
+    X_PC = RigidTransform(station.part(fit.hole).X_AP.inverse() @ fit.p_AoF)
+    X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
+    holding = lost_grasp(station.held_opening)
+
+    def soft(name: str, force: float, target, until, timeout: float) -> Phase:
+        return Phase(
+            f"{fit.hole}: {name}",
+            until,
+            timeout=timeout,
+            left=impedance(config, jaw, X_JawC, target, force),
+            guard=lambda sensed: holding(sensed) or too_much_force(sensed),
+            awake=awake,
+            fine_log=True,
+        )
+
+    def height(sensed: Sensed) -> np.ndarray:
+        return (sensed.X_WF(jaw) @ X_JawC).translation()[2:]
+
+    def gap(outcome: Outcome) -> float:
+        return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
+
+    start = fit.depth + NEAR
+    down = sinking(X_WSeat, start, -BEYOND, config.speed)
+    outcome = yield soft("insert", config.force_limit, down, Stalled(height), 6.0)
+    if gap(outcome) > fit.depth / 2:
+        mouth = gap(outcome)
+        search = spiral(X_WSeat, mouth - BEYOND, config)
+        found = lambda sensed: height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3  # noqa: E731
+        turns = config.search_radius**2 * np.pi / config.search_pitch
+        yield soft("search", config.search_force, search, found, turns / config.search_speed)
+        down = sinking(X_WSeat, mouth - 1e-3, -BEYOND, config.speed)
+        outcome = yield soft("insert again", config.force_limit, down, Stalled(height), 6.0)
+
+
+def too_much_force(sensed: Sensed) -> str | None:
+    """Guard: the wrist feels more than an insertion may take."""
+    force = float(np.linalg.norm(sensed.wrench["left"][3:]))
+    return f"insertion force {force:.1f} N" if force > TOO_MUCH else None
+
+
+def impedance(
+    config: InsertionConfig, jaw, X_JawC: RigidTransform, target, force: float
+) -> Impedance:
+    """Return the impedance about the hole, with a limited downward force."""
+    turn, side = config.rotational_stiffness, config.lateral_stiffness
+    return Impedance(
+        jaw,
+        X_JawC,
+        target,
+        stiffness=np.array([turn, turn, YAW_STIFFNESS, side, side, side]),
+        limit=np.array([TORQUE_LIMIT] * 3 + [LATERAL_LIMIT, LATERAL_LIMIT, force]),
+    )
+
+
+def sinking(
+    X_WSeat: RigidTransform, start: float, end: float, speed: float
+) -> Callable[[float], RigidTransform]:
+    """Return a target that sinks from ``start`` to ``end`` above the seat [m]."""
+    return lambda t: raised(X_WSeat, max(start - speed * t, end))
+
+
+def spiral(
+    X_WSeat: RigidTransform, height: float, config: InsertionConfig
+) -> Callable[[float], RigidTransform]:
+    """Return a target on an Archimedean spiral of constant speed about the axis of the hole.
+
+    With pitch p the arc length is s = p angle^2 / (4 pi), so the angle is sqrt(4 pi s / p).
+    """
+
+    def target(t: float) -> RigidTransform:
+        angle = np.sqrt(4 * np.pi * config.search_speed * t / config.search_pitch)
+        radius = config.search_pitch * angle / (2 * np.pi)
+        X = raised(X_WSeat, height)
+        offset = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        return RigidTransform(X.rotation(), X.translation() + offset)
+
+    return target
+
+
+def seat_errors(station: Station, fit: Fit) -> tuple[float, float]:
+    """Return the measured gap [m] and tilt [rad] of the seated part."""
+    X_GoalP = goal_pose(station, fit).InvertAndCompose(station.sense(fit.hole))
+    tilt = float(np.arccos(np.clip(X_GoalP.rotation().matrix()[2, 2], -1.0, 1.0)))
+    return float(X_GoalP.translation()[2]), tilt
+
+

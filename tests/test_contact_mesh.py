@@ -1,0 +1,179 @@
+"""The frozen bed's mesh: valid, conforming to the part, and complete."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
+from scipy.spatial.transform import Rotation
+
+from cell.soft_jig.bed import Bed
+from cell.soft_jig.columns import TetMesh
+from cell.soft_jig.contact_mesh import bed_mesh, conforming_cells, imprint_mesh, outline
+from cell.soft_jig.parameters import JigParameters
+from cell.soft_jig.polygons import area, clip, lower_facets, subtract
+from cell.soft_jig.samples import SurfaceSamples
+
+PARAMS = JigParameters()
+SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
+
+
+def prism(radius: float, low: float, high: float, n: int = 24) -> NDArray[np.float64]:
+    angle = np.arange(n) * 2 * np.pi / n
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    return np.concatenate([np.column_stack([ring, np.full(n, z)]) for z in (low, high)])
+
+
+def box(low: list[float], high: list[float]) -> NDArray[np.float64]:
+    return np.array(np.meshgrid(*zip(low, high, strict=True))).reshape(3, -1).T
+
+
+MOTOR = [prism(0.0175, -0.0534, -0.024), prism(0.0185, -0.024, 0.0)]
+PLATE = [
+    box([-0.035, -0.033, 0], [0.035, 0.027, 0.005]),
+    box([-0.035, -0.033, -0.015], [0.035, -0.028, 0]),
+]
+POSTURES = {
+    "motor standing": (MOTOR, [0, 0, 0]),
+    "motor standing, turned": (MOTOR, [0, 0, 17]),
+    "motor lying": (MOTOR, [90, 0, 0]),
+    "motor lying, turned": (MOTOR, [90, 0, 30]),
+    "plate face down": (PLATE, [180, 0, 0]),
+    "plate foot down": (PLATE, [0, 0, 0]),
+    "plate on its foot": (PLATE, [90, 0, 0]),
+    "plate on its foot, turned": (PLATE, [90, 0, 20]),
+}
+
+
+def pressed(hulls: list[NDArray[np.float64]], euler_deg: list[float], force: float = 20.0):
+    """Press convex hulls into a bed quasi-statically, freeze it, return bed and hulls in J."""
+    R_JP = Rotation.from_euler("xyz", euler_deg, degrees=True).as_matrix()
+    mesh = trimesh.util.concatenate([trimesh.convex.convex_hull(h) for h in hulls])
+    samples = SurfaceSamples.of("part", mesh)
+    corners = np.concatenate(hulls) @ R_JP.T
+    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    bed = Bed(PARAMS.bag, PARAMS.soil)
+    p_JP = np.array([-center[0], -center[1], PARAMS.bag.cap_height - corners[:, 2].min()])
+    carried = 0.0
+    while carried < force:
+        p_JP[2] -= 2e-5
+        motion = (np.zeros(3), np.array([0, 0, -0.02]))
+        carried = bed.press((R_JP, p_JP), motion, samples, 1e-3)[0][2]
+        bed.settle(1e-3)
+    bed.jam(PARAMS.vacuum.contraction)
+    return bed, [hull @ R_JP.T + p_JP for hull in hulls]
+
+
+def overlap(mesh: TetMesh, hulls: list[NDArray[np.float64]]) -> float:
+    """Return how far points of the mesh's surface lie inside the part at most [m]."""
+    corners = mesh.vertices[mesh.boundary()]
+    weights = np.random.default_rng(0).dirichlet([1, 1, 1], 100)
+    points = np.einsum("kj,tjc->tkc", weights, corners).reshape(-1, 3)
+    depth = []
+    for hull in hulls:
+        equations = ConvexHull(hull).equations
+        depth.append(float((-(points @ equations[:, :3].T + equations[:, 3]).max(axis=1)).max()))
+    return max(depth)
+
+
+@pytest.fixture(scope="module", params=POSTURES)
+def imprint(request):
+    hulls, euler_deg = POSTURES[request.param]
+    bed, hulls_J = pressed(hulls, euler_deg)
+    return bed, hulls_J, imprint_mesh(bed, PARAMS.jammed, hulls_J)
+
+
+def test_imprint_has_positive_tetrahedra_and_a_closed_surface(imprint) -> None:
+    """Every edge of the surface belongs to two triangles, and it encloses the mesh's volume."""
+    _, _, mesh = imprint
+    surface = trimesh.Trimesh(mesh.vertices, mesh.boundary(), process=False)
+    assert mesh.volumes().min() > 0
+    assert surface.is_watertight
+    assert surface.volume == pytest.approx(mesh.volumes().sum(), rel=1e-9)
+
+
+def test_imprint_leaves_room_for_the_part(imprint) -> None:
+    """Nothing reaches into the part but the squeeze of the walls, and 0.06 mm at the foot's end."""
+    _, hulls, mesh = imprint
+    assert overlap(mesh, hulls) < abs(PARAMS.jammed.squeeze) + 0.06e-3
+
+
+def test_imprint_is_as_large_as_the_bed(imprint) -> None:
+    """The mesh leaves out the steep border of the cap and chords of the dome: 15 % at most."""
+    bed, _, mesh = imprint
+    assert 0.8 * bed.volume < mesh.volumes().sum() < bed.volume
+
+
+def test_imprint_is_small_enough_to_simulate(imprint) -> None:
+    _, _, mesh = imprint
+    assert len(mesh.tetrahedra) < 1600
+
+
+def test_floor_shares_the_facets_of_a_standing_part() -> None:
+    """The floor of a standing prism is its own bottom polygon, drawn in by the squeeze."""
+    bed, hulls = pressed(MOTOR, [0, 0, 0])
+    mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
+    bottom = hulls[0][:, 2].min()
+    top = np.abs(mesh.vertices[:, 2] - bottom) < 1e-9
+    rim = np.hypot(*mesh.vertices[top, :2].T)
+    apothem_shift = abs(PARAMS.jammed.squeeze) / np.cos(np.pi / 24)
+    assert np.sum(np.abs(rim - (0.0175 - apothem_shift)) < 1e-8) == 24
+
+
+def test_wall_of_a_leaning_part_leans_with_it() -> None:
+    """At 1 deg the walls stay parallel to the part: no more overlap than the squeeze."""
+    bed, hulls = pressed(MOTOR, [1, 0, 0], 10.0)
+    lean = np.array([0.0, -np.tan(np.radians(1))])
+    assert overlap(imprint_mesh(bed, PARAMS.jammed, hulls, lean), hulls) < 0.08e-3
+
+
+def test_untouched_bed_gives_the_dome() -> None:
+    """A part above the bag leaves no imprint."""
+    bed = Bed(PARAMS.bag, PARAMS.soil)
+    above = [hull + [0, 0, 0.2] for hull in MOTOR]
+    mesh, dome = imprint_mesh(bed, PARAMS.jammed, above), bed_mesh(bed, PARAMS.jammed)
+    assert np.array_equal(mesh.vertices, dome.vertices)
+
+
+def test_vtk_text_holds_every_point_and_cell() -> None:
+    mesh = bed_mesh(Bed(PARAMS.bag, PARAMS.soil), PARAMS.jammed)
+    lines = mesh.vtk().splitlines()
+    assert lines[4] == f"POINTS {len(mesh.vertices)} double"
+    assert lines.count("10") == len(mesh.tetrahedra)
+
+
+def test_largest_depth_of_a_known_tetrahedral_cube() -> None:
+    """A cube of edge 2 with one vertex in its middle: 1 deep."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
+    hull = trimesh.convex.convex_hull(corners)
+    apex = np.zeros((1, 3))
+    tetrahedra = np.column_stack([hull.faces[:, ::-1], np.full(len(hull.faces), 8)])
+    mesh = TetMesh(np.concatenate([hull.vertices, apex]), tetrahedra)
+    assert mesh.largest_depth() == pytest.approx(1.0)
+    assert mesh.volumes().sum() == pytest.approx(8.0)
+
+
+def test_polygons_clip_and_subtract_conserve_area() -> None:
+    """A part inside plus the pieces outside make the whole."""
+    hole = SQUARE * 0.5 + 0.3
+    inside = area(clip(SQUARE, hole))
+    outside = sum(area(piece) for piece in subtract(SQUARE, hole))
+    assert inside == pytest.approx(0.25)
+    assert inside + outside == pytest.approx(1.0)
+
+
+def test_lower_facets_of_a_box_are_its_bottom() -> None:
+    (facet,) = lower_facets(box([0, 0, 0.1], [1, 2, 3]))
+    assert area(facet.polygon) == pytest.approx(2.0)
+    assert facet.height(np.array([[0.5, 0.5]])) == pytest.approx(0.1)
+
+
+def test_neighbouring_cells_share_their_hanging_vertices() -> None:
+    """Two small squares beside a large one: the large one gets the vertex between them."""
+    big = SQUARE * 2
+    cells = [big, SQUARE + [2, 0], SQUARE + [2, 1]]
+    _, welded = conforming_cells(cells, longest=10.0)
+    assert len(welded[0]) == 5
+    assert len(outline(welded)) == 9 - 1
