@@ -130,14 +130,14 @@ class Bed:
     def _points_over_bed(
         self, X_JP: tuple[Array, Array], samples: SurfaceSamples
     ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """Return the underside's arms (m, 3), heights over cell centres, areas and cell numbers (m,)."""
+        """Return the underside's arms, heights over the cells' centres, areas and cell numbers."""
         R_JP, p_JP = X_JP
         under = self._underside(R_JP, samples)
         p_PQ_J = under.points @ R_JP.T
         n = len(self.axis)
         # One whole-cell shift for the part: its bins then cover the cells without gap or overlap.
         shift = np.rint((p_JP[:2] - self.axis[0]) / self.bag.cell)
-        # The border of the grid lies outside the aperture, so clipping drops points, not moves them.
+        # The grid's border lies outside the aperture: clipping drops points, it does not move them.
         column = np.clip(under.bins + shift, 0, n - 1).astype(np.int64)
         flat = column[:, 0] * n + column[:, 1]
         keep = np.flatnonzero(self.active.reshape(-1)[flat])
@@ -181,7 +181,7 @@ class Bed:
     # The slow part: collar, stretch, yield pressure.
 
     def settle(self, dt: float) -> None:
-        """Advance the clock; every `settle_period` raise the collar and update the yield pressure."""
+        """Advance the clock; every `settle_period` raise the collar and renew the yield pressure."""
         self._step_done = True
         self._since_settled += dt
         if self._since_settled < self.soil.settle_period - dt / 2:
@@ -251,7 +251,9 @@ class Bed:
         """
         ceiling = self._ceiling()
         held = ceiling <= self.heights
-        self.heights = np.where(held, np.maximum(ceiling, self.bag.floor), self.heights)
+        conformed = np.where(held, np.maximum(ceiling, self.bag.floor), self.heights)
+        self.displaced += float((self.heights - conformed).sum()) * self.bag.cell**2
+        self.heights = conformed
         self._shrinkage = np.where(held, 0.0, contraction * self.heights)
         self.heights = self.heights - self._shrinkage
         self._traction[:] = 0.0

@@ -131,7 +131,7 @@ def _surface(bed: Bed) -> tuple[Array, Array]:
 
 
 def _touching_facets(bed: Bed, undersides: Sequence[list[Facet]]) -> list[Facet]:
-    """Return the parts of the facets that the bed touches; where bodies overlap, the lower one's."""
+    """Return what the bed touches of the facets; where bodies overlap, of the lower one."""
     xy, surface = _surface(bed)
     touched = _envelope(undersides, xy) < surface
     window = _contact_window(bed, undersides, xy[touched].mean(axis=0))
@@ -153,7 +153,7 @@ def _touching_facets(bed: Bed, undersides: Sequence[list[Facet]]) -> list[Facet]
 
 
 def _mostly_touches(facet: Facet, underside: list[Facet], xy: Array, surface: Array) -> bool:
-    """Say whether the bed touches most of a facet; a curved body's facets are kept or left whole."""
+    """Say whether the bed touches most of a facet: a curved body's facets are kept whole."""
     over = contains(facet.polygon, xy)
     touching = _envelope([underside], xy[over]) < surface[over]
     return bool(over.any() and touching.mean() > 0.5)

@@ -195,7 +195,7 @@ class SoftJig:
         if self.state is JigState.JAMMED:
             return
         self._press(root_context, dt)
-        if self.pressure >= vacuum.jam_fraction * vacuum.pressure:
+        if self._pumping and self.pressure >= vacuum.jam_fraction * vacuum.pressure:
             self._jam(root_context)
         else:
             self._draw_if_due(root_context, dt)

@@ -33,7 +33,7 @@ class Facet:
 
 
 def lower_facets(vertices: Array) -> list[Facet]:
-    """Return the downward faces of the convex hull of (n, 3) vertices, coplanar triangles merged."""
+    """Return the downward faces of the convex hull of (n, 3) vertices, coplanar ones merged."""
     hull = ConvexHull(vertices)
     groups: dict[tuple[float, ...], set[int]] = {}
     equations: dict[tuple[float, ...], Array] = {}

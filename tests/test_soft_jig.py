@@ -1,0 +1,143 @@
+"""The soft jig in Drake: pressing, freezing, carrying, and continuing from a saved state."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from cell.soft_jig import JigParameters, JigState
+from tests.jig_rig import Rig
+
+# A short press that still reaches the drive's limit of 20 N.
+FAST = {"speed": 0.04, "duration": 0.8}
+
+
+@pytest.fixture(scope="module")
+def held() -> Rig:
+    """Return a rig whose motor was pressed, frozen and let go a second ago, with what happened."""
+    rig = Rig()
+    rig.press(**FAST)
+    rig.volume_after_press = rig.jig.bed.volume
+    rig.jam()
+    rig.step(100)
+    before = rig.X_JM.translation()
+    rig.let_go()
+    rig.speeds = []
+    for _ in range(1000):
+        rig.step()
+        rig.speeds.append(float(np.linalg.norm(rig.velocity)))
+    rig.kick = float(np.linalg.norm(rig.X_JM.translation() - before))
+    return rig
+
+
+def full_state(rig: Rig) -> NDArray[np.float64]:
+    return rig.plant.GetPositionsAndVelocities(rig.plant_context)
+
+
+def test_states_follow_the_commands_and_the_pressure() -> None:
+    """Inflated -> soft -> jammed when 95 % of the vacuum is there -> soft again."""
+    rig = Rig()
+    vacuum = rig.params.vacuum
+    rig.jig.inflate(rig.context)
+    assert rig.jig.state is JigState.INFLATED
+    rig.jig.evacuate(rig.context)
+    assert rig.jig.state is JigState.SOFT
+    rig.step(250)
+    assert rig.jig.pressure == pytest.approx(vacuum.pressure * (1 - np.exp(-1)), rel=1e-6)
+    rig.jam()
+    assert rig.context.get_time() == pytest.approx(-0.25 * np.log(0.05), abs=2e-3)
+    rig.jig.soften(rig.context)
+    assert rig.jig.state is JigState.SOFT
+    rig.step(100)
+    assert rig.jig.pressure < vacuum.pressure
+
+
+def test_part_is_let_go_without_a_kick(held: Rig) -> None:
+    """Freezing and releasing move the motor by less than 0.3 mm and 20 mm/s."""
+    assert held.kick < 0.3e-3
+    assert max(held.speeds) < 20e-3
+
+
+def test_frozen_bed_carries_the_part_at_rest(held: Rig) -> None:
+    """After a second it stands: below 1 mm/s and 1 deg, the contact carries its weight."""
+    assert held.speeds[-1] < 1e-3
+    assert np.degrees(held.tilt) < 1.0
+    results = held.plant.get_contact_results_output_port().Eval(held.plant_context)
+    assert results.num_hydroelastic_contacts() == 1
+    assert results.num_point_pair_contacts() == 0
+    force = results.hydroelastic_contact_info(0).F_Ac_W().translational()
+    assert abs(force[2]) == pytest.approx(0.195 * 9.81, rel=0.02)
+
+
+def test_bed_keeps_its_volume(held: Rig) -> None:
+    """No slack is declared: nothing is lost but the contraction when frozen."""
+    bed = held.jig.bed
+    rest = type(bed)(bed.bag, bed.soil).volume
+    assert held.volume_after_press == pytest.approx(rest, rel=1e-9)
+    assert rest * (1 - held.params.vacuum.contraction) * 0.999 < bed.volume < rest
+
+
+def test_pressed_depth_is_in_the_range_of_the_references(held: Rig) -> None:
+    """22 N (20 N and the motor's weight) sink the can 8.5 mm quasi-statically, 14 mm at 30 N."""
+    assert 7e-3 < held.depth < 14e-3
+
+
+def test_half_the_step_gives_the_same_depth() -> None:
+    depth = []
+    for time_step in (1e-3, 0.5e-3):
+        rig = Rig(time_step=time_step)
+        rig.press(**FAST)
+        depth.append(rig.depth)
+    assert depth[1] == pytest.approx(depth[0], rel=0.05)
+
+
+def test_restored_state_continues_bit_for_bit() -> None:
+    """In the middle of pressing and across the freezing; the Context is put back as well."""
+    rig = Rig()
+    rig.press(speed=0.04, duration=0.35)
+    rig.jig.evacuate(rig.context)
+    rig.step(13)
+    context, jig = rig.context.Clone(), rig.jig.save_state()
+    rig.step(850)
+    first, heights = full_state(rig), rig.jig.bed.heights.copy()
+    assert rig.jig.state is JigState.JAMMED
+    rig.context.SetTimeStateAndParametersFrom(context)
+    rig.jig.restore_state(rig.context, jig)
+    rig.simulator.Initialize()
+    assert rig.jig.state is JigState.SOFT
+    rig.step(850)
+    assert np.array_equal(full_state(rig), first)
+    assert np.array_equal(rig.jig.bed.heights, heights)
+
+
+def test_frozen_part_resists_torque_and_side_load(held: Rig) -> None:
+    """0.1 N m about its axis and 3 N at half height leave it within 1 deg and 1 mm."""
+    start = held.X_JM
+    held.pull((3.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.0267))
+    held.step(300)
+    moved = start.InvertAndCompose(held.X_JM)
+    held.extra = []
+    held.step(200)
+    assert np.linalg.norm(moved.translation()) < 1e-3
+    assert np.degrees(moved.rotation().ToAngleAxis().angle()) < 1.0
+
+
+def test_letting_air_in_keeps_the_part_where_it_is(held: Rig) -> None:
+    """Soft again, the plastic bed carries the weight in the same imprint."""
+    height = held.X_JM.translation()[2]
+    held.jig.soften(held.context)
+    held.step(500)
+    assert held.jig.state is JigState.SOFT
+    assert held.X_JM.translation()[2] == pytest.approx(height, abs=1e-3)
+    assert np.linalg.norm(held.velocity) < 5e-3
+    up = [force.F_Bq_W.translational()[2] for force in held.jig.applied_forces]
+    assert up[0] == pytest.approx(0.195 * 9.81, rel=0.05)
+    assert sum(up) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_inflating_wipes_the_imprint(held: Rig) -> None:
+    held.jig.inflate(held.context)
+    bed = held.jig.bed
+    assert bed.heights.max() == pytest.approx(JigParameters().bag.cap_height)
+    assert held.jig.state is JigState.INFLATED
