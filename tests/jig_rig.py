@@ -25,6 +25,7 @@ from pydrake.multibody.plant import (
     MultibodyPlantConfig,
 )
 from pydrake.multibody.tree import (
+    FixedOffsetFrame,
     PdControllerGains,
     PrismaticJoint,
     RigidBody,
@@ -33,6 +34,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
+from trimesh.exchange.obj import export_obj
 
 from cell.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
 
@@ -56,7 +58,9 @@ def motor_samples() -> SurfaceSamples:
     """Return the stand-in's surface: can and gearbox, no terminals."""
     gearbox = trimesh.creation.cylinder(radius=GEARBOX_RADIUS, height=-GEARBOX_REAR, sections=48)
     gearbox.apply_translation([0, 0, GEARBOX_REAR / 2])
-    return SurfaceSamples.of("motor", trimesh.util.concatenate([can_mesh(), gearbox]))
+    whole = trimesh.util.concatenate([can_mesh(), gearbox])
+    assert isinstance(whole, trimesh.Trimesh)
+    return SurfaceSamples.of("motor", whole)
 
 
 def _rigid() -> ProximityProperties:
@@ -115,7 +119,7 @@ class Rig:
         unit = UnitInertia(6.2e-5 / MASS, 6.2e-5 / MASS, 3.2e-5 / MASS)
         inertia = SpatialInertia(MASS, CENTER_OF_MASS, unit.ShiftFromCenterOfMass(-CENTER_OF_MASS))
         motor = self.plant.AddRigidBody("motor", inertia)
-        text = trimesh.exchange.obj.export_obj(can_mesh(), digits=12)
+        text = export_obj(can_mesh(), digits=12)
         can = Convex(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "can")))
         self.plant.RegisterCollisionGeometry(motor, RigidTransform(), can, "bed_can", _rigid())
         self.plant.RegisterVisualGeometry(
@@ -133,7 +137,10 @@ class Rig:
         instance = self.plant.AddModelInstance("carriage")
         inertia = SpatialInertia.SolidBoxWithMass(5.0, 0.1, 0.1, 0.1)
         carriage = self.plant.AddRigidBody("carriage", instance, inertia)
-        frame = self.plant.AddFrame(_offset_frame(self.plant))
+        offset = RigidTransform([0, 0.15, 0])
+        frame = self.plant.AddFrame(
+            FixedOffsetFrame("slide_base", self.plant.world_frame(), offset)
+        )
         self.slide = self.plant.AddJoint(
             PrismaticJoint("slide", frame, carriage.body_frame(), [0, 0, 1])
         )
@@ -209,9 +216,3 @@ class Rig:
         load.p_BoBq_B = np.array(p_MQ)
         load.F_Bq_W = SpatialForce(np.array(torque), np.array(force))
         self.extra = [load]
-
-
-def _offset_frame(plant):
-    from pydrake.multibody.tree import FixedOffsetFrame
-
-    return FixedOffsetFrame("slide_base", plant.world_frame(), RigidTransform([0, 0.15, 0]))

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 import pytest
 import trimesh
@@ -47,10 +49,11 @@ POSTURES = {
 }
 
 
-def pressed(hulls: list[NDArray[np.float64]], euler_deg: list[float], force: float = 20.0):
+def pressed(hulls: list[NDArray[np.float64]], euler_deg: Sequence[float], force: float = 20.0):
     """Press convex hulls into a bed quasi-statically, freeze it, return bed and hulls in J."""
     R_JP = Rotation.from_euler("xyz", euler_deg, degrees=True).as_matrix()
     mesh = trimesh.util.concatenate([trimesh.convex.convex_hull(h) for h in hulls])
+    assert isinstance(mesh, trimesh.Trimesh)
     samples = SurfaceSamples.of("part", mesh)
     corners = np.concatenate(hulls) @ R_JP.T
     center = (corners.min(axis=0) + corners.max(axis=0)) / 2

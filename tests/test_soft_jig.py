@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -13,22 +15,37 @@ from tests.jig_rig import Rig
 FAST = {"speed": 0.04, "duration": 0.8}
 
 
+@dataclass(frozen=True)
+class Held:
+    """A rig whose motor was pressed, frozen and let go, and what happened.
+
+    Attributes:
+        rig: A second after letting go.
+        pressed_volume: Of the bed before freezing [m3].
+        kick: Way of the motor since just before it was let go [m].
+        speeds: Of the motor, per step after letting go [m/s].
+    """
+
+    rig: Rig
+    pressed_volume: float
+    kick: float
+    speeds: list[float]
+
+
 @pytest.fixture(scope="module")
-def held() -> Rig:
-    """Return a rig whose motor was pressed, frozen and let go a second ago, with what happened."""
+def held() -> Held:
     rig = Rig()
     rig.press(**FAST)
-    rig.volume_after_press = rig.jig.bed.volume
+    volume = rig.jig.bed.volume
     rig.jam()
     rig.step(100)
     before = rig.X_JM.translation()
     rig.let_go()
-    rig.speeds = []
+    speeds = []
     for _ in range(1000):
         rig.step()
-        rig.speeds.append(float(np.linalg.norm(rig.velocity)))
-    rig.kick = float(np.linalg.norm(rig.X_JM.translation() - before))
-    return rig
+        speeds.append(float(np.linalg.norm(rig.velocity)))
+    return Held(rig, volume, float(np.linalg.norm(rig.X_JM.translation() - before)), speeds)
 
 
 def full_state(rig: Rig) -> NDArray[np.float64]:
@@ -53,34 +70,34 @@ def test_states_follow_the_commands_and_the_pressure() -> None:
     assert rig.jig.pressure < vacuum.pressure
 
 
-def test_part_is_let_go_without_a_kick(held: Rig) -> None:
+def test_part_is_let_go_without_a_kick(held: Held) -> None:
     """Freezing and releasing move the motor by less than 0.3 mm and 20 mm/s."""
     assert held.kick < 0.3e-3
     assert max(held.speeds) < 20e-3
 
 
-def test_frozen_bed_carries_the_part_at_rest(held: Rig) -> None:
+def test_frozen_bed_carries_the_part_at_rest(held: Held) -> None:
     """After a second it stands: below 1 mm/s and 1 deg, the contact carries its weight."""
     assert held.speeds[-1] < 1e-3
-    assert np.degrees(held.tilt) < 1.0
-    results = held.plant.get_contact_results_output_port().Eval(held.plant_context)
+    assert np.degrees(held.rig.tilt) < 1.0
+    results = held.rig.plant.get_contact_results_output_port().Eval(held.rig.plant_context)
     assert results.num_hydroelastic_contacts() == 1
     assert results.num_point_pair_contacts() == 0
     force = results.hydroelastic_contact_info(0).F_Ac_W().translational()
     assert abs(force[2]) == pytest.approx(0.195 * 9.81, rel=0.02)
 
 
-def test_bed_keeps_its_volume(held: Rig) -> None:
+def test_bed_keeps_its_volume(held: Held) -> None:
     """No slack is declared: nothing is lost but the contraction when frozen."""
-    bed = held.jig.bed
+    bed = held.rig.jig.bed
     rest = type(bed)(bed.bag, bed.soil).volume
-    assert held.volume_after_press == pytest.approx(rest, rel=1e-9)
-    assert rest * (1 - held.params.vacuum.contraction) * 0.999 < bed.volume < rest
+    assert held.pressed_volume == pytest.approx(rest, rel=1e-9)
+    assert rest * (1 - held.rig.params.vacuum.contraction) * 0.999 < bed.volume < rest
 
 
-def test_pressed_depth_is_in_the_range_of_the_references(held: Rig) -> None:
+def test_pressed_depth_is_in_the_range_of_the_references(held: Held) -> None:
     """22 N (20 N and the motor's weight) sink the can 8.5 mm quasi-statically, 14 mm at 30 N."""
-    assert 7e-3 < held.depth < 14e-3
+    assert 7e-3 < held.rig.depth < 14e-3
 
 
 def test_half_the_step_gives_the_same_depth() -> None:
@@ -111,33 +128,33 @@ def test_restored_state_continues_bit_for_bit() -> None:
     assert np.array_equal(rig.jig.bed.heights, heights)
 
 
-def test_frozen_part_resists_torque_and_side_load(held: Rig) -> None:
+def test_frozen_part_resists_torque_and_side_load(held: Held) -> None:
     """0.1 N m about its axis and 3 N at half height leave it within 1 deg and 1 mm."""
-    start = held.X_JM
-    held.pull((3.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.0267))
-    held.step(300)
-    moved = start.InvertAndCompose(held.X_JM)
-    held.extra = []
-    held.step(200)
+    start = held.rig.X_JM
+    held.rig.pull((3.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.0267))
+    held.rig.step(300)
+    moved = start.InvertAndCompose(held.rig.X_JM)
+    held.rig.extra = []
+    held.rig.step(200)
     assert np.linalg.norm(moved.translation()) < 1e-3
     assert np.degrees(moved.rotation().ToAngleAxis().angle()) < 1.0
 
 
-def test_letting_air_in_keeps_the_part_where_it_is(held: Rig) -> None:
+def test_letting_air_in_keeps_the_part_where_it_is(held: Held) -> None:
     """Soft again, the plastic bed carries the weight in the same imprint."""
-    height = held.X_JM.translation()[2]
-    held.jig.soften(held.context)
-    held.step(500)
-    assert held.jig.state is JigState.SOFT
-    assert held.X_JM.translation()[2] == pytest.approx(height, abs=1e-3)
-    assert np.linalg.norm(held.velocity) < 5e-3
-    up = [force.F_Bq_W.translational()[2] for force in held.jig.applied_forces]
+    height = held.rig.X_JM.translation()[2]
+    held.rig.jig.soften(held.rig.context)
+    held.rig.step(500)
+    assert held.rig.jig.state is JigState.SOFT
+    assert held.rig.X_JM.translation()[2] == pytest.approx(height, abs=1e-3)
+    assert np.linalg.norm(held.rig.velocity) < 5e-3
+    up = [force.F_Bq_W.translational()[2] for force in held.rig.jig.applied_forces]
     assert up[0] == pytest.approx(0.195 * 9.81, rel=0.05)
     assert sum(up) == pytest.approx(0.0, abs=1e-12)
 
 
-def test_inflating_wipes_the_imprint(held: Rig) -> None:
-    held.jig.inflate(held.context)
-    bed = held.jig.bed
+def test_inflating_wipes_the_imprint(held: Held) -> None:
+    held.rig.jig.inflate(held.rig.context)
+    bed = held.rig.jig.bed
     assert bed.heights.max() == pytest.approx(JigParameters().bag.cap_height)
-    assert held.jig.state is JigState.INFLATED
+    assert held.rig.jig.state is JigState.INFLATED

@@ -1,6 +1,7 @@
 """The soft jig: a bag of beads that conforms to a part while soft and freezes under vacuum."""
 
-from cell.soft_jig.jig import JigError, JigState, SoftJig
+from cell.soft_jig.drake_values import JigError
+from cell.soft_jig.jig import JigState, SoftJig
 from cell.soft_jig.parameters import (
     BagParameters,
     JammedParameters,

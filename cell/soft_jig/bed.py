@@ -181,7 +181,7 @@ class Bed:
     # The slow part: collar, stretch, yield pressure.
 
     def settle(self, dt: float) -> None:
-        """Advance the clock; every `settle_period` raise the collar and renew the yield pressure."""
+        """Advance the clock; every `settle_period` raise the collar and the yield pressure."""
         self._step_done = True
         self._since_settled += dt
         if self._since_settled < self.soil.settle_period - dt / 2:
@@ -209,7 +209,7 @@ class Bed:
         touched = ceiling <= self.heights
         if not touched.any():
             return
-        distance = ndimage.distance_transform_edt(~touched) * self.bag.cell
+        distance = np.asarray(ndimage.distance_transform_edt(~touched)) * self.bag.cell
         free = ~touched & (self._dome > self.bag.floor)
         weight = np.where(free, np.exp(-distance / self.soil.collar_length), 0.0)
         for _ in range(4):

@@ -188,7 +188,11 @@ class ColumnMesh:
         for stop in [*sorted(below), own]:
             faces += self._strip(low, high, start, stop)
             start = stop
-        return faces if (a, b) == (low, high) else [face[::-1] for face in faces]
+        return (
+            faces
+            if (a, b) == (low, high)
+            else [(third, second, first) for first, second, third in faces]
+        )
 
     def _strip(
         self, low: int, high: int, start: tuple[int, int], stop: tuple[int, int]

@@ -126,8 +126,8 @@ def _touching_bodies(bed: Bed, hulls: Sequence[Array]) -> list[list[Facet]]:
 
 
 def _surface(bed: Bed) -> tuple[Array, Array]:
-    xy = np.column_stack([bed.x[bed.active], bed.y[bed.active]])
-    return xy, bed.heights[bed.active] + TOUCH
+    xy = np.stack([bed.x[bed.active], bed.y[bed.active]], axis=1).astype(float)
+    return xy, np.asarray(bed.heights[bed.active] + TOUCH)
 
 
 def _touching_facets(bed: Bed, undersides: Sequence[list[Facet]]) -> list[Facet]:

@@ -15,35 +15,24 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.common import MemoryFile
-from pydrake.geometry import (
-    AddCompliantHydroelasticProperties,
-    AddContactMaterial,
-    Box,
-    CollisionFilterDeclaration,
-    Convex,
-    GeometryId,
-    GeometrySet,
-    InMemoryMesh,
-    Mesh,
-    ProximityProperties,
-    Role,
-    SceneGraph,
-)
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, Role, SceneGraph
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import (
-    CoulombFriction,
-    ExternallyAppliedSpatialForce,
-    MultibodyPlant,
-)
+from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import Context
 
-from cell.errors import CellError
 from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
+from cell.soft_jig.drake_values import (
+    applied_force,
+    drake_proximity,
+    drake_shape,
+    force_row,
+    hull_vertices,
+    lean_of,
+)
 from cell.soft_jig.parameters import JigParameters
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.visual import membrane_shape
@@ -62,10 +51,6 @@ class JigState(Enum):
     INFLATED = "inflated"
     SOFT = "soft"
     JAMMED = "jammed"
-
-
-class JigError(CellError):
-    """The soft jig was asked for something its state does not allow."""
 
 
 class SoftJig:
@@ -125,9 +110,9 @@ class SoftJig:
         X_BJ = RigidTransform() if X_BJ is None else X_BJ
         bed = Bed(params.bag, params.soil)
         mesh = bed_mesh(bed, params.jammed)
-        soft = _proximity(mesh, params, params.jammed.soft_gradient)
+        soft = drake_proximity(mesh, params, params.jammed.soft_gradient)
         bed_id = plant.RegisterCollisionGeometry(
-            base_body, X_BJ, _shape(mesh), "soft_jig_bed", soft
+            base_body, X_BJ, drake_shape(mesh), "soft_jig_bed", soft
         )
         color = np.array(SILICONE_COLOR)
         visual_id = plant.RegisterVisualGeometry(
@@ -237,8 +222,8 @@ class SoftJig:
         p_WP = self._plant.EvalBodyPoseInWorld(context, body).translation()
         X_WB = self._plant.EvalBodyPoseInWorld(context, self._base)
         return [
-            _applied(body, np.zeros(3), F_W),
-            _applied(self._base, X_WB.inverse() @ p_WP, -F_W),
+            applied_force(body, np.zeros(3), F_W),
+            applied_force(self._base, X_WB.inverse() @ p_WP, -F_W),
         ]
 
     # Freezing and drawing.
@@ -252,7 +237,7 @@ class SoftJig:
         for body, _ in self._pressing.values():
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
             hulls += self._bed_hulls(body, X_JP)
-            lean = _lean(X_JP.rotation())
+            lean = lean_of(X_JP.rotation())
         self._forces = []
         self._mesh = imprint_mesh(self.bed, self.params.jammed, hulls, lean)
         self._install(root_context)
@@ -269,11 +254,11 @@ class SoftJig:
         jammed = self.params.jammed
         frozen = self.state is JigState.JAMMED
         gradient = jammed.pressure_gradient if frozen else jammed.soft_gradient
-        properties = _proximity(self._mesh, self.params, gradient)
+        properties = drake_proximity(self._mesh, self.params, gradient)
         with self.filters_lifted(root_context):
             # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
             graph.RemoveRole(context, source, self._bed_id, Role.kProximity)
-            graph.ChangeShape(context, source, self._bed_id, _shape(self._mesh))
+            graph.ChangeShape(context, source, self._bed_id, drake_shape(self._mesh))
             graph.AssignRole(context, source, self._bed_id, properties)
             self._filter(context)
         self._draw(context)
@@ -311,7 +296,7 @@ class SoftJig:
         hulls = []
         for geometry in self._plant.GetCollisionGeometriesForBody(body):
             if self._name(geometry).startswith(BED_PREFIX):
-                vertices = _vertices(inspector.GetShape(geometry), self._name(geometry))
+                vertices = hull_vertices(inspector.GetShape(geometry), self._name(geometry))
                 X_JG = X_JP @ inspector.GetPoseInFrame(geometry)
                 hulls.append((X_JG @ vertices.T).T)
         return hulls
@@ -338,7 +323,7 @@ class SoftJig:
             "since_drawn": self._since_drawn,
             "vertices": self._mesh.vertices.copy(),
             "tetrahedra": self._mesh.tetrahedra.copy(),
-            "forces": np.array([_as_row(force) for force in self._forces]).reshape(-1, 10),
+            "forces": np.array([force_row(force) for force in self._forces]).reshape(-1, 10),
         }
 
     def restore_state(self, root_context: Context, state: dict[str, Any]) -> None:
@@ -354,61 +339,4 @@ class SoftJig:
 
     def _from_row(self, row: Array) -> ExternallyAppliedSpatialForce:
         body = self._plant.get_body(BodyIndex(int(row[0])))
-        return _applied(body, row[1:4], SpatialForce(row[4:7], row[7:10]))
-
-
-def _shape(mesh: TetMesh) -> Mesh:
-    return Mesh(InMemoryMesh(mesh_file=MemoryFile(mesh.vtk(), ".vtk", "soft_jig_bed")))
-
-
-def _proximity(mesh: TetMesh, params: JigParameters, gradient: float) -> ProximityProperties:
-    """Return properties with the modulus that makes Drake's pressure field have this gradient."""
-    jammed = params.jammed
-    properties = ProximityProperties()
-    # The resolution hint is not used for meshes that are given as such.
-    AddCompliantHydroelasticProperties(jammed.layer, gradient * mesh.largest_depth(), properties)
-    friction = CoulombFriction(jammed.friction, jammed.friction)
-    AddContactMaterial(dissipation=jammed.dissipation, friction=friction, properties=properties)
-    return properties
-
-
-def _applied(
-    body: RigidBody, p_BoBq_B: Array, F_Bq_W: SpatialForce
-) -> ExternallyAppliedSpatialForce:
-    applied = ExternallyAppliedSpatialForce()
-    applied.body_index = body.index()
-    applied.p_BoBq_B = p_BoBq_B
-    applied.F_Bq_W = F_Bq_W
-    return applied
-
-
-def _as_row(applied: ExternallyAppliedSpatialForce) -> Array:
-    """Return body index, p_BoBq_B, torque and force in one row (10,)."""
-    F_Bq_W = applied.F_Bq_W
-    return np.concatenate(
-        [
-            [float(int(applied.body_index))],
-            applied.p_BoBq_B,
-            F_Bq_W.rotational(),
-            F_Bq_W.translational(),
-        ]
-    )
-
-
-def _vertices(shape: Box | Convex | Mesh, name: str) -> Array:
-    """Return the corners (n, 3) of a shape in its geometry frame."""
-    if isinstance(shape, Box):
-        signs = np.array(np.meshgrid([-1, 1], [-1, 1], [-1, 1])).reshape(3, -1).T
-        return signs * shape.size() / 2
-    if isinstance(shape, Convex | Mesh):
-        hull = shape.GetConvexHull()
-        return np.array([hull.vertex(i) for i in range(hull.num_vertices())])
-    kind = type(shape).__name__
-    raise JigError(f"Collision '{name}' is a {kind}; the bed conforms to: Box, Convex, Mesh.")
-
-
-def _lean(R_JP: RotationMatrix) -> Array:
-    """Return the horizontal shift per height of the part axis that is nearest to upright."""
-    axes = R_JP.matrix()
-    up = axes[:, np.argmax(np.abs(axes[2]))]
-    return up[:2] / up[2]
+        return applied_force(body, row[1:4], SpatialForce(row[4:7], row[7:10]))

@@ -52,8 +52,8 @@ class SurfaceSamples:
     @staticmethod
     def of(name: str, mesh: trimesh.Trimesh, spacing: float = 0.001) -> SurfaceSamples:
         """Sample a closed surface: centroids of its triangles, split down to `spacing`."""
-        vertices, faces = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing)
-        triangles = vertices[faces]
+        split = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, spacing)
+        triangles = np.asarray(split[0])[np.asarray(split[1])]
         cross = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
         doubled = np.linalg.norm(cross, axis=1)
         kept = doubled > 1e-14
