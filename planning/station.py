@@ -68,6 +68,7 @@ class Station:
         seed: Seeds every sampling planner, together with the number of the call.
         model: The planning copy.
         held: Name of the part in the left hand; None when it is empty.
+        fixed: Names of the parts that the jig holds, with what has been mated to them.
         held_opening: Opening of the tip pads when it was gripped [m].
     """
 
@@ -77,6 +78,7 @@ class Station:
     seed: int
     model: CollisionModel = field(init=False)
     held: str | None = None
+    fixed: tuple[str, ...] = ()
     held_opening: float = 0.0
     _calls: int = 0
 
@@ -100,7 +102,9 @@ class Station:
         """Return the pose of a tool frame as it is now."""
         return self.arm(arm).frame(frame).CalcPoseInWorld(self.context)
 
-    def surroundings(self, may_touch: Iterable[tuple[str, str]] = ()) -> Surroundings:
+    def surroundings(
+        self, may_touch: Iterable[tuple[str, str]] = (), clearance: float | None = None
+    ) -> Surroundings:
         """Return everything as it is sensed now."""
         plant, cell = self.cell.plant, self.cell
         names = [part.part.name for part in cell.parts]
@@ -112,6 +116,7 @@ class Station:
             X_WP={name: self.sense(name) for name in names if name != self.held},
             X_HandP=held,
             may_touch=tuple(may_touch),
+            obstacle_clearance=clearance,
         )
 
     def configurations(
@@ -121,17 +126,22 @@ class Station:
         X_WF: RigidTransform,
         near: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
+        clearance: float | None = None,
     ) -> list[np.ndarray]:
         """Return the collision-free joint angles that put a tool frame at a pose, nearest first."""
-        self.model.arrange(self.surroundings(may_touch))
+        self.model.arrange(self.surroundings(may_touch, clearance))
         solutions = ik_solutions(self.arm(arm), self.context, frame, X_WF, near)
         return [q for q in solutions if self.model.is_free(arm, q)]
 
     def move(
-        self, arm: str, q_goal: np.ndarray, may_touch: Iterable[tuple[str, str]] = ()
+        self,
+        arm: str,
+        q_goal: np.ndarray,
+        may_touch: Iterable[tuple[str, str]] = (),
+        clearance: float | None = None,
     ) -> JointMotion:
         """Return a collision-free motion from where the arm is to ``q_goal`` (6,)."""
-        self.model.arrange(self.surroundings(may_touch))
+        self.model.arrange(self.surroundings(may_touch, clearance))
         self._calls += 1
         path = plan_path(
             self.model,
