@@ -132,6 +132,21 @@ def test_wall_of_a_leaning_part_leans_with_it() -> None:
     assert overlap(imprint_mesh(bed, PARAMS.jammed, hulls, lean), hulls) < 0.08e-3
 
 
+def test_plate_in_pieces_around_a_hole_gives_one_floor() -> None:
+    """Four boxes around a hole make the imprint of the whole plate."""
+    pieces = [
+        box([-0.035, -0.033, 0], [-0.01, 0.027, 0.005]),
+        box([0.01, -0.033, 0], [0.035, 0.027, 0.005]),
+        box([-0.01, -0.033, 0], [0.01, -0.01, 0.005]),
+        box([-0.01, 0.01, 0], [0.01, 0.027, 0.005]),
+    ]
+    bed, hulls = pressed([box([-0.035, -0.033, 0], [0.035, 0.027, 0.005])], [0, 0, 0])
+    pieces_J = [piece + (hulls[0].min(axis=0) - [-0.035, -0.033, 0]) for piece in pieces]
+    whole = imprint_mesh(bed, PARAMS.jammed, hulls)
+    joined = imprint_mesh(bed, PARAMS.jammed, pieces_J)
+    assert joined.volumes().sum() == pytest.approx(whole.volumes().sum(), rel=1e-6)
+
+
 def test_untouched_bed_gives_the_dome() -> None:
     """A part above the bag leaves no imprint."""
     bed = Bed(PARAMS.bag, PARAMS.soil)

@@ -120,9 +120,28 @@ def _envelope(undersides: Sequence[list[Facet]], xy: Array) -> Array:
 
 def _touching_bodies(bed: Bed, hulls: Sequence[Array]) -> list[list[Facet]]:
     """Return the undersides of the bodies that reach the bed, lowest first."""
-    undersides = sorted((lower_facets(hull) for hull in hulls), key=_lowest)
+    undersides = sorted(_joined([lower_facets(hull) for hull in hulls]), key=_lowest)
     xy, surface = _surface(bed)
     return [body for body in undersides if np.any(_envelope([body], xy) < surface)]
+
+
+def _joined(undersides: Sequence[list[Facet]]) -> list[list[Facet]]:
+    """Join flat undersides in one plane to their convex hull, for example the pieces of a plate.
+
+    A hole between the pieces is filled to the same level: the bed bulges into it a little anyway.
+    """
+    joined: list[list[Facet]] = []
+    flat: dict[tuple[float, ...], list[Facet]] = {}
+    for underside in undersides:
+        if len(underside) == 1:
+            facet = underside[0]
+            flat.setdefault((*facet.slope.round(4), round(facet.offset, 6)), []).append(facet)
+        else:
+            joined.append(underside)
+    for facets in flat.values():
+        whole = convex_hull(np.concatenate([facet.polygon for facet in facets]))
+        joined.append([replace(facets[0], polygon=whole)])
+    return joined
 
 
 def _surface(bed: Bed) -> tuple[Array, Array]:
