@@ -99,7 +99,7 @@ class GripperConfig:
 class DriverConfig:
     """The electric screwdriver."""
 
-    free_speed: float = setting(30.0, "rad/s", "Spindle while the bolt runs down [M].", above=0.0)
+    free_speed: float = setting(50.0, "rad/s", "Spindle while the bolt runs down: 480 rpm [A].", above=0.0)
     seat_speed: float = setting(
         10.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0
     )
@@ -126,10 +126,10 @@ class MotionConfig:
     """Free motion of the arms."""
 
     velocity_scale: float = setting(
-        0.3, "", "Share of the joint speed limits; slip in the jaws grows with it [M].",
+        0.5, "", "Share of the joint speed limits; slip in the jaws grows with it [M].",
         above=0.0, at_most=1.0,
     )  # fmt: skip
-    acceleration_limit: float = setting(4.0, "rad/s2", "Of every joint [A].", above=0.0)
+    acceleration_limit: float = setting(6.0, "rad/s2", "Of every joint [A].", above=0.0)
     arm_clearance: float = setting(0.02, "m", "Kept between the arms [A].", at_least=0.0)
     obstacle_clearance: float = setting(
         0.005, "m", "Kept between robot and surroundings [A].", at_least=0.0
@@ -184,9 +184,11 @@ class CellConfig:
 
     simulation: SimulationConfig = SimulationConfig()
     left_arm: ArmConfig = ArmConfig(
-        p_WB=(-0.55, 0.0, 0.0), home_deg=(180.0, -110.0, 100.0, -80.0, -90.0, 0.0)
+        p_WB=(-0.45, 0.0, 0.0), home_deg=(180.0, -110.0, 100.0, -80.0, -90.0, 0.0)
     )
-    right_arm: ArmConfig = ArmConfig(p_WB=(0.55, 0.0, 0.0))
+    right_arm: ArmConfig = ArmConfig(
+        p_WB=(0.45, 0.0, 0.0), home_deg=(60.0, -110.0, 110.0, -90.0, -90.0, 0.0)
+    )
     workcell: WorkcellConfig = WorkcellConfig()
     gripper: GripperConfig = GripperConfig()
     driver: DriverConfig = DriverConfig()

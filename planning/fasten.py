@@ -35,7 +35,8 @@ from planning.station import Station
 from planning.timing import JointMotion
 
 LIFT = 0.06
-ABOVE = 0.03  # A bolt hovers this far above where it will stand [m] [A].
+ABOVE = 0.012  # A bolt hovers this far above where it will stand: its tip is over the hole [m] [A].
+ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
 TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
 SLOW = 0.02  # [m/s] [A]
 RETREAT = 0.05
@@ -67,6 +68,14 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         awake=held,
     )
     X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(bolt)
+    yield Phase(
+        f"{bolt}: align",
+        motion_finished,
+        timeout=5.0,
+        left=station.line("left", jaw, raised(X_WStand, ENTRY) @ X_JawP.inverse(), speed=SLOW),
+        guard=holding,
+        awake=held,
+    )
     awake = held | _assembled(station, bolt)
     yield Phase(
         f"{bolt}: lower",

@@ -18,6 +18,8 @@ APPROACH = 0.05  # The jaw comes the last stretch straight along its own z [m] [
 CLEARANCE = 0.004  # The jaws open this much wider than the part [m] [A].
 WIDEST = 0.050  # Stroke of the gripper [m] [R].
 HAND_SPEED = 0.08  # Of the hand on straight stretches [m/s] [A].
+RELEASE_TIME = 0.15  # Opening by twice the clearance takes half of it at 0.15 m/s [D].
+CLEAR = 0.012  # The jaws have left the part when they are this far back [m] [A].
 GRIP_TIME = 0.25  # Closing and building up the force [s] [A].
 # A jaw that closes this much further than when it gripped holds nothing any more [m].
 LOST = 0.0015
@@ -146,22 +148,22 @@ def grip(station: Station, part: str, grasp: Grasp, awake: frozenset[str] = froz
 def let_go(
     station: Station, part: str, grasp: Grasp, retreat: float, awake: frozenset[str]
 ) -> Iterator[Phase]:
-    """Yield the phases that open the jaws and back the hand off straight."""
-    yield Phase(f"{part}: release", after(0.3), timeout=1.0, jaw=opened(grasp), awake=awake)
+    """Yield the phases that open the jaws and back the hand off straight.
+
+    The part stays awake until the jaws are clear of it.
+    """
+    yield Phase(f"{part}: release", after(RELEASE_TIME), timeout=1.0, jaw=opened(grasp), awake=awake)
     station.held = None
-    X_WJaw = station.pose("left", grasp.jaw)
-    yield Phase(
-        f"{part}: retreat",
-        motion_finished,
-        timeout=10.0,
-        left=station.line(
-            "left",
-            station.arm("left").frame(grasp.jaw),
-            backed_off(X_WJaw, retreat),
-            speed=HAND_SPEED,
-        ),
-        awake=awake,
-    )
+    X_WJaw, frame = station.pose("left", grasp.jaw), station.arm("left").frame(grasp.jaw)
+    for name, distance, stay in (("clear", CLEAR, awake), ("retreat", retreat, frozenset())):
+        goal = backed_off(X_WJaw, distance)
+        yield Phase(
+            f"{part}: {name}",
+            motion_finished,
+            timeout=10.0,
+            left=station.line("left", frame, goal, speed=HAND_SPEED),
+            awake=stay,
+        )
 
 
 def first(reaches: Iterator[Reach], part: str, station: Station) -> Reach:

@@ -24,6 +24,9 @@ from planning.timing import JointMotion, time_path
 
 
 
+SINGULAR_SINE = 0.2  # Of wrist 2 and of the elbow [A].
+
+
 def collision_model(config: CellConfig, product: Product) -> CollisionModel:
     """Return the planning copy of a cell, with the inflated bag as an obstacle."""
 
@@ -131,7 +134,7 @@ class Station:
         """Return the collision-free joint angles that put a tool frame at a pose, nearest first."""
         self.model.arrange(self.surroundings(may_touch, clearance))
         solutions = ik_solutions(self.arm(arm), self.context, frame, X_WF, near)
-        return [q for q in solutions if self.model.is_free(arm, q)]
+        return [q for q in solutions if is_regular(q) and self.model.is_free(arm, q)]
 
     def move(
         self,
@@ -200,6 +203,14 @@ class Station:
         flange = plant.GetFrameByName("flange", self.cell.left.instance)
         body = self.cell.parts[self.held].body
         return plant.CalcSpatialInertia(self.context, flange, [body.index()])
+
+
+def is_regular(q: np.ndarray) -> bool:
+    """Return whether the arm is well away from its wrist and elbow singularities.
+
+    Close to one, a straight line of the tool asks for large turns of the joints.
+    """
+    return bool(abs(np.sin(q[4])) > SINGULAR_SINE and abs(np.sin(q[2])) > SINGULAR_SINE)
 
 
 def slowed(motion: JointMotion, duration: float) -> JointMotion:
