@@ -58,12 +58,15 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     X_WStand = standing_pose(station, bolt)
     holding, held = lost_grasp(station.held_opening), frozenset([bolt])
     above = raised(X_WStand, ABOVE) @ X_JawP.inverse()
-    (q_above, *_) = station.configurations("left", jaw, above, reach.q_before, [("held", "*")])
+    may_touch = [("held", "*")]
+    (q_above, *_) = station.configurations(
+        "left", jaw, above, reach.q_before, may_touch, clearance=FINE_CLEARANCE
+    )
     yield Phase(
         f"{bolt}: transfer",
         motion_finished,
         timeout=20.0,
-        left=station.move("left", q_above),
+        left=station.move("left", q_above, may_touch, clearance=FINE_CLEARANCE),
         guard=holding,
         awake=held,
     )
@@ -202,13 +205,9 @@ class Feed:
 
     def __call__(self, sensed: Sensed) -> tuple[np.ndarray, np.ndarray]:
         """Return the joint target for the next step."""
-        speed = float(
-            np.clip(FEED_GAIN * (self.thrust - sensed.bit_push), -FEED_LIMIT, FEED_LIMIT)
-        )
+        speed = float(np.clip(FEED_GAIN * (self.thrust - sensed.bit_push), -FEED_LIMIT, FEED_LIMIT))
         rate = speed * self.line.duration / self.length
-        self.progress = float(
-            np.clip(self.progress + rate * self.dt, 0.0, self.line.duration)
-        )
+        self.progress = float(np.clip(self.progress + rate * self.dt, 0.0, self.line.duration))
         q, v = self.line.at(self.progress)
         return q, v * rate
 
