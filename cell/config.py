@@ -99,7 +99,9 @@ class GripperConfig:
 class DriverConfig:
     """The electric screwdriver."""
 
-    free_speed: float = setting(50.0, "rad/s", "Spindle while the bolt runs down: 480 rpm [A].", above=0.0)
+    free_speed: float = setting(
+        50.0, "rad/s", "Spindle while the bolt runs down: 480 rpm [A].", above=0.0
+    )
     seat_speed: float = setting(
         10.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0
     )
@@ -164,8 +166,13 @@ class InsertionConfig:
 class DisturbanceConfig:
     """What is not where it should be; drawn once per run from the seed."""
 
-    tray_position_sigma: float = setting(0.0, "m", "Of the tray, x and y [A].", at_least=0.0)
-    tray_yaw_sigma_deg: float = setting(0.0, "deg", "Of the tray [A].", at_least=0.0)
+    tray_position_sigma: float = setting(
+        5e-4, "m", "Standard deviation of the tray's place along x and y: set down by hand [A].",
+        at_least=0.0,
+    )  # fmt: skip
+    tray_yaw_sigma_deg: float = setting(
+        1.0, "deg", "Standard deviation of the tray about the vertical [A].", at_least=0.0
+    )
 
 
 @dataclass(frozen=True)

@@ -41,7 +41,9 @@ class Simulation:
 
     def __init__(self, cell: Cell, seed: int = 0) -> None:
         if cell.diagram is None:
-            raise CellError("The cell has no diagram: use build_cell, or build your own and pass it.")
+            raise CellError(
+                "The cell has no diagram: use build_cell, or build your own and pass it."
+            )
         self.cell = cell
         self.simulator = Simulator(cell.diagram)
         self.root: Context = self.simulator.get_mutable_context()
@@ -236,6 +238,8 @@ class _PhaseRun:
             spindle_torque=sensed.spindle_torque,
             jig_pressure=cell.soft_jig.pressure,
             jig_state=list(JigState).index(cell.soft_jig.state),
+            thread_turns=[thread.turns(context) for thread in cell.threads.values()],
+            clamp_force=[thread.clamp_force(context) for thread in cell.threads.values()],
         )
 
     def finish(self) -> None:
@@ -252,9 +256,7 @@ def impedance_torque(arm: Arm, context: Context, command: Impedance, t: float) -
     X_WD = command.X_WD(t)
     jacobian = arm.jacobian(context, command.frame, command.X_FC.translation())
     turn = (X_WD.rotation() @ X_WC.rotation().inverse()).ToAngleAxis()
-    error = np.concatenate(
-        [turn.angle() * turn.axis(), X_WD.translation() - X_WC.translation()]
-    )
+    error = np.concatenate([turn.angle() * turn.axis(), X_WD.translation() - X_WC.translation()])
     spring = np.clip(command.stiffness * error, -command.limit, command.limit)
     mass = np.repeat([EFFECTIVE_INERTIA, EFFECTIVE_MASS], 3)
     damping = 2.0 * np.sqrt(command.stiffness * mass)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -21,8 +21,6 @@ from planning.collision_model import CollisionModel, Surroundings
 from planning.kinematics import ik_solutions, tool_pose
 from planning.motion import plan_line, plan_path
 from planning.timing import JointMotion, time_path
-
-
 
 SINGULAR_SINE = 0.2  # Of wrist 2 and of the elbow [A].
 
@@ -69,6 +67,7 @@ class Station:
         context: Plant context, only read: joint angles of arms and tools.
         sense: Returns the sensed pose X_WP of a part.
         seed: Seeds every sampling planner, together with the number of the call.
+    nominal: What the planner believes the cell to be; None: exactly as it was built.
         model: The planning copy.
         held: Name of the part in the left hand; None when it is empty.
         fixed: Names of the parts that the jig holds, with what has been mated to them.
@@ -79,6 +78,7 @@ class Station:
     context: Context
     sense: Callable[[str], RigidTransform]
     seed: int
+    nominal: CellConfig | None = None
     model: CollisionModel = field(init=False)
     held: str | None = None
     fixed: tuple[str, ...] = ()
@@ -86,12 +86,12 @@ class Station:
     _calls: int = 0
 
     def __post_init__(self) -> None:
-        self.model = collision_model(self.cell.config, self.cell.product)
+        self.model = collision_model(self.config, self.cell.product)
 
     @property
     def config(self) -> CellConfig:
-        """Configuration of the cell."""
-        return self.cell.config
+        """Configuration of the cell, as far as the planner knows."""
+        return self.cell.config if self.nominal is None else self.nominal
 
     def part(self, name: str) -> Part:
         """Return a part's description."""
