@@ -1,4 +1,4 @@
-"""The errors this project raises on purpose: one line that names the culprit and the alternatives."""
+"""The errors this project raises on purpose: one line names the culprit and the alternatives."""
 
 from __future__ import annotations
 

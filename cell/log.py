@@ -32,4 +32,4 @@ class Log:
 
     def save(self, path: Path) -> None:
         """Write all columns as a compressed npz."""
-        np.savez_compressed(path, **self.arrays())
+        np.savez_compressed(path, allow_pickle=False, **self.arrays())

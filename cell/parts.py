@@ -121,8 +121,9 @@ class Parts:
 
     @contextmanager
     def filters_lifted(self, root: Context) -> Iterator[None]:
-        """Lift the filters of sleeping parts: Drake forbids lasting changes of geometry roles and
-        filters while passing ones are active.
+        """Lift the filters of sleeping parts.
+
+        Drake forbids lasting changes of geometry roles and filters while passing ones are active.
         """
         asleep = [part for part in self if part.asleep]
         for part in asleep:
@@ -159,9 +160,7 @@ def add_parts(
             plant.RenameModelInstance(instance, part.name)
             body = plant.get_body(plant.GetBodyIndices(instance)[0])
             joint = plant.AddJoint(
-                QuaternionFloatingJoint(
-                    f"{part.name}_free", plant.world_frame(), body.body_frame()
-                )
+                QuaternionFloatingJoint(f"{part.name}_free", plant.world_frame(), body.body_frame())
             )
             X_WP = X_WT @ part.X_TrayP
             joint.SetDefaultPose(X_WP)

@@ -30,9 +30,7 @@ class WrenchSensor:
         F_CJc_Jc = forces[int(self.weld.index())]
         # Drake reports what the joint exerts on its child, in the joint frame on the child.
         R_WJc = self.weld.frame_on_child().CalcPoseInWorld(plant_context).rotation()
-        return -np.concatenate(
-            [R_WJc @ F_CJc_Jc.rotational(), R_WJc @ F_CJc_Jc.translational()]
-        )
+        return -np.concatenate([R_WJc @ F_CJc_Jc.rotational(), R_WJc @ F_CJc_Jc.translational()])
 
 
 @dataclass(frozen=True)

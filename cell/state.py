@@ -108,7 +108,7 @@ def _drives(simulation: Simulation) -> dict[str, Any]:
 
 def write_state(path: Path, state: State) -> None:
     """Write a saved state to a compressed npz."""
-    np.savez_compressed(path, **state)
+    np.savez_compressed(path, allow_pickle=False, **state)
 
 
 def read_state(path: Path) -> State:

@@ -1,9 +1,10 @@
 """Screw threads: a bolt that is driven into a tapped hole.
 
 What is modelled instead of simulated: the flanks of the thread and the hex of the bit. A *follower*
-body rides on a ``ScrewJoint`` of the threaded part (axis along the hole, lead = pitch). It is locked
-until the thread *catches*: then three ball constraints tie the bolt to it, and the bolt advances
-one pitch per turn and carries axial force through the joint, whose reaction is the clamp force.
+body rides on a ``ScrewJoint`` of the threaded part (axis along the hole, lead = pitch). It is
+locked until the thread *catches*: then three ball constraints tie the bolt to it, and the bolt
+advances one pitch per turn and carries axial force through the joint, whose reaction is the clamp
+force.
 Three more ball constraints tie the bolt to the bit while it is engaged. Both ties are gated: the
 measured axial, lateral, tilt and phase errors must be small first, so nothing is pulled into place.
 

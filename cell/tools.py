@@ -63,8 +63,9 @@ class Driver:
     drive: Drive
 
     def command(self, root: Context, speed: float) -> None:
-        """Turn the spindle about the tool's axis [rad/s]; clockwise seen from the driver is
-        positive and tightens.
+        """Turn the spindle about the tool's axis [rad/s].
+
+        Clockwise seen from the driver is positive and tightens.
         """
         n = len(FLOAT_JOINTS) + 1
         v = np.zeros(n)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.phase import Condition, Jaw, Outcome, Phase, Sensed, after, motion_finished
+from cell.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
 from cell.product import Grasp
 from cell.tools import JAW_SETBACK
 from planning.kinematics import Unreachable
@@ -152,7 +152,9 @@ def let_go(
 
     The part stays awake until the jaws are clear of it.
     """
-    yield Phase(f"{part}: release", after(RELEASE_TIME), timeout=1.0, jaw=opened(grasp), awake=awake)
+    yield Phase(
+        f"{part}: release", after(RELEASE_TIME), timeout=1.0, jaw=opened(grasp), awake=awake
+    )
     station.held = None
     X_WJaw, frame = station.pose("left", grasp.jaw), station.arm("left").frame(grasp.jaw)
     for name, distance, stay in (("clear", CLEAR, awake), ("retreat", retreat, frozenset())):
@@ -170,8 +172,10 @@ def first(reaches: Iterator[Reach], part: str, station: Station) -> Reach:
     """Return the first reachable grasp."""
     for reach in reaches:
         return reach
-    raise Unreachable(
-        "left", "jaw", station.sense(part), f"no grasp of part '{part}' is reachable there"
-    )
+    raise no_grasp(station, part)
 
 
+def no_grasp(station: Station, part: str) -> Unreachable:
+    """Return the error that says that the left hand cannot take a part where it is."""
+    reason = f"no grasp of part '{part}' is reachable there"
+    return Unreachable("left", "jaw", station.sense(part), reason)

@@ -222,5 +222,3 @@ def seat_errors(station: Station, fit: Fit) -> tuple[float, float]:
     X_GoalP = goal_pose(station, fit).InvertAndCompose(station.sense(fit.hole))
     tilt = float(np.arccos(np.clip(X_GoalP.rotation().matrix()[2, 2], -1.0, 1.0)))
     return float(X_GoalP.translation()[2]), tilt
-
-

@@ -9,9 +9,9 @@ from cell.errors import CellError
 from cell.phase import Phase
 from cell.product import Fit, Product
 from planning.fasten import hold, place_bolt, release_hold, star_order, tighten_bolt
-from planning.fixing import FixingPlan
 from planning.insert_shaft import insert_shaft
 from planning.pick_place import pick_place
+from planning.planner import FixingPlan
 from planning.station import Station
 
 

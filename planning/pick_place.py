@@ -8,16 +8,18 @@ from pydrake.math import RigidTransform
 
 from cell.events import evacuate_jig, inflate_jig, soften_jig
 from cell.phase import Condition, Phase, Sensed, after, motion_finished
+from cell.product import Grasp
 from cell.soft_jig import JigState
 from planning.grasping import (
     Reach,
-    first,
     let_go,
     lost_grasp,
+    no_grasp,
     reachable_grasps,
     take,
 )
-from planning.placement import choose_placement
+from planning.kinematics import Unreachable
+from planning.placement import Placement, choose_placement
 from planning.station import Station
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
@@ -78,24 +80,23 @@ def pick_place(
     yield Phase(f"{part}: settle", after(SETTLE_TIME), timeout=2.0, awake=awake)
 
 
-def _choose(station: Station, part: str, up: str, later: tuple[str, ...]):
-    """Return the first grasp with a placement, nearest grasps first."""
-    X_WP = station.sense(part)
-    failure: Exception | None = None
-    for reach in _top_first(station, part, X_WP):
+def _choose(
+    station: Station, part: str, up: str, later: tuple[str, ...]
+) -> tuple[Reach, Placement]:
+    """Return the first grasp with a placement, grasps from above first."""
+    failure = None
+    for reach in _top_first(station, part, station.sense(part)):
         try:
             return reach, choose_placement(station, part, up, reach, later)
-        except Exception as error:
+        except Unreachable as error:
             failure = error
-    if failure is not None:
-        raise failure
-    return first(iter(()), part, station), None
+    raise failure or no_grasp(station, part)
 
 
 def _top_first(station: Station, part: str, X_WP: RigidTransform) -> Iterator[Reach]:
     """Yield reachable grasps, those that come from above first."""
 
-    def level(grasp) -> float:
+    def level(grasp: Grasp) -> float:
         return float((X_WP @ grasp.X_PJaw).rotation().matrix()[2, 2])
 
     grasps = sorted(station.part(part).grasps, key=level)
@@ -114,5 +115,3 @@ def jammed(station: Station, least: float) -> Condition:
         return sensed.time >= least and station.cell.soft_jig.state is JigState.JAMMED
 
     return condition
-
-

@@ -109,12 +109,12 @@ def radii(points: np.ndarray, choose: Callable[[np.ndarray], float]) -> tuple[fl
     return corner, corner * float(np.cos(np.pi / facets))
 
 
-def test_can_has_24_flats_and_corners_between_the_axes() -> None:
+def test_can_has_16_flats_and_corners_between_the_axes() -> None:
     can = surfaces(mu.motor_model())["bed_can"].vertices
     angles = np.unique(np.round(np.rad2deg(np.arctan2(can[:, 1], can[:, 0])), 6))
-    np.testing.assert_allclose(np.diff(angles), 15.0, atol=1e-5)
-    assert angles[0] == pytest.approx(-172.5, abs=1e-5)
-    assert np.linalg.norm(can[:, :2], axis=1).max() == pytest.approx(vertex_radius(0.0174, 24))
+    np.testing.assert_allclose(np.diff(angles), 22.5, atol=1e-5)
+    assert angles[0] == pytest.approx(-168.75, abs=1e-5)
+    assert np.linalg.norm(can[:, :2], axis=1).max() == pytest.approx(vertex_radius(0.0174, 16))
 
 
 def test_plate_boxes_leave_the_gearbox_alone() -> None:

@@ -6,10 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+from jig_rig import Rig
 from numpy.typing import NDArray
 
 from cell.soft_jig import JigParameters, JigState
-from tests.jig_rig import Rig
 
 # A short press that still reaches the drive's limit of 20 N.
 FAST = {"speed": 0.04, "duration": 0.8}

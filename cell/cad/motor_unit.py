@@ -71,7 +71,7 @@ THREAD_PITCH = 0.5
 STEEL = 7850.0  # kg/m3
 
 THREAD_FACETS = 32  # Shared by shank and hole, so that they touch line to line when assembled.
-CAN_FACETS = 16  # Fewer facets make holding torque a matter of corners; the bed has the same 24.
+CAN_FACETS = 16  # Fewer make holding torque a matter of corners [M].
 BORE_FACETS = 64  # Sagitta 7 micrometres against 75 of clearance.
 
 # Contact [D]: softer metal lets a misplaced boss squeeze into the hole at tens of newtons.
@@ -176,7 +176,9 @@ def motor_pieces() -> list[Piece]:
     )
     return [
         Piece("bed_can", _can_surface(), Contact(0.9)),
-        Piece("bed_gearbox", _prism(CAN_FACETS, GEARBOX_BACK, -SEAT_GAP), Contact(0.9), convex=True),
+        Piece(
+            "bed_gearbox", _prism(CAN_FACETS, GEARBOX_BACK, -SEAT_GAP), Contact(0.9), convex=True
+        ),
         # As a convex solid its pressure grows evenly under the whole face, and few tetrahedra meet
         # the plate.
         Piece("seat", _prism(SEAT_FACETS, -SEAT_DEPTH, 0.0), metal, convex=True),
@@ -202,7 +204,9 @@ def _can_surface() -> trimesh.Trimesh:
     ]
     corners = here[::2]
     face = np.array([[corners[0], j, i] for i, j in pairwise(corners[1:])])
-    return trimesh.Trimesh(MM * np.concatenate(points), np.concatenate([*side, face]), process=False)
+    return trimesh.Trimesh(
+        MM * np.concatenate(points), np.concatenate([*side, face]), process=False
+    )
 
 
 def _prism(facets: int, low: float, high: float) -> trimesh.Trimesh:
