@@ -19,7 +19,14 @@ from cell.product import Product
 from cell.sensors import WrenchSensor
 from cell.soft_jig import SoftJig
 from cell.thread import Thread, add_thread
-from cell.tools import Driver, Gripper, connect_driver, connect_gripper, set_tool_gains
+from cell.tools import (
+    Driver,
+    Gripper,
+    connect_driver,
+    connect_gripper,
+    set_driver_gains,
+    set_gripper_gains,
+)
 
 # The jaws wait this far open [m]: wide enough for the motor, narrow enough to see that they move.
 JAW_REST = 0.045
@@ -137,7 +144,8 @@ def add_arms(plant: MultibodyPlant, config: CellConfig) -> tuple[Arm, Arm]:
     """Add both arms with their tools."""
     left = add_arm(plant, "left", "hand_e", config.left_arm)
     right = add_arm(plant, "right", "screwdriver", config.right_arm)
-    set_tool_gains(plant, left.tool, right.tool)
+    set_gripper_gains(plant, left.tool)
+    set_driver_gains(plant, right.tool)
     return left, right
 
 

@@ -142,8 +142,10 @@ class Thread:
     filters_lifted: Callable[[Context], AbstractContextManager[None]] = nullcontext
 
     def reset(self, root: Context) -> None:
-        """Make the bolt loose: ties open, follower locked."""
+        """Make the bolt loose: ties open, follower locked, its own inertia, contact all over."""
         context = self.plant.GetMyMutableContextFromRoot(root)
+        self._set_inertia(context, engaged=False)
+        self._filter_shank(root, caught=False)
         for tie in (self.thread_tie, *self.bit_ties):
             self._tie(context, tie, active=False)
         self.screw.Lock(context)
@@ -159,7 +161,7 @@ class Thread:
         if state is not ThreadState.FREE:
             self._set_inertia(context, engaged=True)
             self._tie(context, self.thread_tie, active=True)
-            self._filter_shank(root)
+            self._filter_shank(root, caught=True)
         if state is ThreadState.CAUGHT:
             self.screw.Unlock(context)
         if bit_position is not None:
@@ -229,7 +231,7 @@ class Thread:
         self.plant.SetPositions(context, self._with_theta(context, theta))
         self._set_inertia(context, engaged=True)
         self._tie(context, self.thread_tie, active=True)
-        self._filter_shank(root)
+        self._filter_shank(root, caught=True)
         self.state, self.caught_angle = ThreadState.CAUGHT, theta
 
     def _with_theta(self, context: Context, theta: float) -> np.ndarray:
@@ -247,14 +249,14 @@ class Thread:
         inertia = SpatialInertia(mass, np.zeros(3), UnitInertia(*moments)).Shift(-real.get_com())
         self.bolt.SetSpatialInertiaInBodyFrame(context, inertia)
 
-    def _filter_shank(self, root: Context) -> None:
+    def _filter_shank(self, root: Context, *, caught: bool) -> None:
         """A caught shank is inside the threaded part: their contact is the thread itself."""
         context = self.scene_graph.GetMyMutableContextFromRoot(root)
         bolt = self.plant.GetCollisionGeometriesForBody(self.bolt)
         parent = self.plant.GetCollisionGeometriesForBody(self.thread_frame.body())
-        declaration = CollisionFilterDeclaration().ExcludeBetween(
-            GeometrySet(bolt), GeometrySet(parent)
-        )
+        declaration = CollisionFilterDeclaration()
+        declare = declaration.ExcludeBetween if caught else declaration.AllowBetween
+        declare(GeometrySet(bolt), GeometrySet(parent))
         with self.filters_lifted(root):
             self.scene_graph.collision_filter_manager(context).Apply(declaration)
 
@@ -268,9 +270,12 @@ class Thread:
         return (self.caught_angle - self.screw.get_rotation(context)) / (2 * np.pi)
 
     def clamp_force(self, plant_context: Context) -> float:
-        """Axial force that the thread carries, positive when it clamps [N]."""
+        """Axial force that the thread carries, positive when it clamps [N].
+
+        A clamped bolt is pulled into the hole, along -z of the joint frame.
+        """
         forces = self.plant.get_reaction_forces_output_port().Eval(plant_context)
-        return float(forces[int(self.screw.index())].translational()[2])
+        return -float(forces[int(self.screw.index())].translational()[2])
 
 
 def _X_FE_seated(position: int) -> RigidTransform:

@@ -23,7 +23,6 @@ FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
 FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 
-
 # The wide jaws stand back behind the tip pads, on both sides together [m] (see cell/cad/hand_e.py).
 JAW_SETBACK = {"tip": 0.0, "nose": 0.0, "wide": 0.024}
 
@@ -86,13 +85,18 @@ class Driver:
         return -FLOAT_STIFFNESS[2] * float(self.float_z.GetOnePosition(plant_context))
 
 
-def set_tool_gains(plant: MultibodyPlant, gripper: ModelInstanceIndex, driver: ModelInstanceIndex):
-    """Give every actuator of the tools its drive, before the plant is finalized."""
-    finger = plant.GetJointActuatorByName("finger_left_joint", gripper)
+def set_gripper_gains(plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
+    """Give the jaw its drive, before the plant is finalized."""
+    finger = plant.GetJointActuatorByName("finger_left_joint", instance)
     finger.set_controller_gains(PdControllerGains(p=JAW_STIFFNESS, d=JAW_DAMPING))
+
+
+def set_driver_gains(plant: MultibodyPlant, instance: ModelInstanceIndex) -> None:
+    """Give spindle and bit holder their drives, before the plant is finalized."""
     for name, p, d in zip(FLOAT_JOINTS, FLOAT_STIFFNESS, FLOAT_DAMPING, strict=True):
-        plant.GetJointActuatorByName(name, driver).set_controller_gains(PdControllerGains(p=p, d=d))
-    spindle = plant.GetJointActuatorByName("spindle_joint", driver)
+        actuator = plant.GetJointActuatorByName(name, instance)
+        actuator.set_controller_gains(PdControllerGains(p=p, d=d))
+    spindle = plant.GetJointActuatorByName("spindle_joint", instance)
     spindle.set_controller_gains(PdControllerGains(p=0.0, d=SPINDLE_GAIN))
 
 
