@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
-from pydrake.geometry import Meshcat, MeshcatVisualizer, MeshcatVisualizerParams, SceneGraph
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import RigidBody, WeldJoint
@@ -30,7 +30,6 @@ from cell.tools import (
 
 # The jaws wait this far open [m]: wide enough for the motor, narrow enough to see that they move.
 JAW_REST = 0.045
-FRAME_PERIOD = 0.04  # Between two pictures in the browser [s]: a film's rate.
 
 
 @dataclass(frozen=True)
@@ -79,19 +78,10 @@ class Cell:
         return self.config.workcell.X_WJ
 
 
-def build_cell(config: CellConfig, product: Product, meshcat: Meshcat | None = None) -> Cell:
-    """Build the simulated cell for one product, as a diagram of its own.
-
-    Args:
-        config: Every number of the cell.
-        product: Whose parts are in it.
-        meshcat: Where to show it while it runs.
-    """
+def build_cell(config: CellConfig, product: Product) -> Cell:
+    """Build the simulated cell for one product, as a diagram of its own."""
     builder = DiagramBuilder()
     cell = add_cell(builder, config, product)
-    if meshcat is not None:
-        params = MeshcatVisualizerParams(publish_period=FRAME_PERIOD)
-        MeshcatVisualizer.AddToBuilder(builder, cell.scene_graph, meshcat, params)
     return replace(cell, diagram=builder.Build())
 
 
