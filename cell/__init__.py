@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from cell.builder import Cell, add_cell, build_cell
     from cell.config import CellConfig
-    from cell.load_product import load_product
+    from cell.loading import load_product
     from cell.product import Product
     from cell.simulation import Simulation
 
@@ -30,7 +30,7 @@ _HOME = {
     "Simulation": "cell.simulation",
     "add_cell": "cell.builder",
     "build_cell": "cell.builder",
-    "load_product": "cell.load_product",
+    "load_product": "cell.loading",
 }
 
 

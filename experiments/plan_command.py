@@ -6,7 +6,7 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cell.load_product import load_product
+from cell.loading import load_product
 from planning.explain import explanation, step_table, step_text, stop_text
 from planning.plan_file import save_plan
 from planning.planner import FixingPlan, plan

@@ -13,7 +13,7 @@ import trimesh
 from cell.cad import motor_unit as mu
 from cell.cad import tray
 from cell.cad.shapes import revolved_surface, vertex_radius
-from cell.load_product import load_product
+from cell.loading import load_product
 from cell.paths import MODELS
 from cell.sdf import Model
 

@@ -17,7 +17,7 @@ from tiny_products import (
 )
 
 from cell.errors import BadOrder, CellError, UnknownName
-from cell.load_product import load_product
+from cell.loading import load_product
 from cell.product import Product
 from planning import FixingPlan, plan
 from planning.directions import open_directions

@@ -13,7 +13,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
 from cell.errors import BadPart
-from cell.load_product import load_product
+from cell.loading import load_product
 from cell.paths import model_url, new_parser
 from cell.sdf import LINK, Contact, Look, Model, Piece, mesh_inertia, sdf_text, write_model
 

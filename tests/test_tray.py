@@ -11,7 +11,7 @@ from pydrake.multibody.tree import PrismaticJoint
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cell.load_product import load_product
+from cell.loading import load_product
 from cell.paths import model_url, new_parser
 from cell.product import Grasp
 from cell.sdf import LINK

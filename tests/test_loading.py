@@ -7,7 +7,7 @@ import pytest
 import trimesh
 
 from cell.errors import BadOrder, BadPart, CellError, UnknownName
-from cell.load_product import load_product
+from cell.loading import load_product
 from cell.mesh_io import MESH_SUFFIXES
 
 GOOD = """

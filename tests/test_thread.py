@@ -1,0 +1,236 @@
+"""A bolt that is driven home: gates, helix, clamp force, and what holds it afterwards."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RotationMatrix
+from thread_rig import ThreadRig
+
+from cell.thread import (
+    BIT_GATE,
+    ENGAGED_MASS_FACTOR,
+    THREAD_GATE,
+    Gate,
+    Misfit,
+    ThreadState,
+)
+
+FIND_SPEED = 3.0  # The bit turns slowly until its hex meets the socket [rad/s].
+SLOW_BELOW = 6e-4  # [m]
+
+
+@dataclass(frozen=True)
+class Story:
+    """One bolt from standing loose to tightened, the bit gone.
+
+    Attributes:
+        rig: At the end.
+        loose_mass: Of the bolt before it was driven [kg].
+        driven_mass: Of the bolt while its thread is engaged [kg].
+        high_bit_engaged: Whether a bit 20 mm above the socket was let in.
+        resting_misfit: Of the thread, as the bolt stands loose on its mouth.
+        caught_without_bit: Whether the thread caught then, with no bit to turn the bolt.
+        bit_misfit, thread_misfit: The last ones before the ties closed.
+        helix: Turns and advance [m] since the thread caught, one row per step until near the seat.
+        torque: Of the spindle when the clutch tripped [N m].
+        clamp_at_trip, clamp_after: Before locking, and after the bit has left [N].
+    """
+
+    rig: ThreadRig
+    loose_mass: float
+    driven_mass: float
+    high_bit_engaged: bool
+    resting_misfit: Misfit
+    caught_without_bit: bool
+    bit_misfit: Misfit
+    thread_misfit: Misfit
+    helix: np.ndarray
+    torque: float
+    clamp_at_trip: float
+    clamp_after: float
+
+
+def mass(rig: ThreadRig) -> float:
+    return rig.bolt.get_mass(rig.context)
+
+
+def engage_bit(rig: ThreadRig) -> Misfit:
+    """Lower the slowly turning bit into the socket; return its misfit when it dropped in."""
+    rig.put_bit(rig.seated_bit + [0.0, 0.0, 0.002])
+    rig.driver.command(rig.root, FIND_SPEED)
+    for _ in range(2000):
+        rig.move_bit(-0.02 if rig.p_WE[2] > rig.seated_bit[2] else 0.0)
+        rig.step()
+        misfit, _ = rig.thread.bit_misfit(rig.context)
+        if rig.thread.try_engage_bit(rig.root):
+            return misfit
+    raise AssertionError("the bit found no socket")
+
+
+def catch_thread(rig: ThreadRig) -> Misfit:
+    """Turn the bolt until its thread catches; return the misfit at which it did."""
+    rig.driver.command(rig.root, rig.config.free_speed)
+    for _ in range(1000):
+        misfit, _ = rig.thread.thread_misfit(rig.context)
+        if rig.thread.try_catch(rig.root):
+            return misfit
+        rig.keep_thrust()
+        rig.step()
+    raise AssertionError("the thread did not catch")
+
+
+def run_down(rig: ThreadRig) -> np.ndarray:
+    """Drive the bolt to just above its seat; return turns and advance, (n, 2)."""
+    start, rows = rig.height, []
+    while rig.height > SLOW_BELOW:
+        rig.keep_thrust()
+        rig.step()
+        rows.append((rig.thread.turns(rig.context), start - rig.height))
+        assert len(rows) < 4000
+    return np.array(rows)
+
+
+def tighten(rig: ThreadRig) -> tuple[float, float]:
+    """Turn until the clutch trips; return torque and clamp force at that moment."""
+    rig.driver.command(rig.root, rig.config.seat_speed)
+    for _ in range(3000):
+        rig.keep_thrust()
+        rig.step()
+        torque = rig.driver.torque(rig.context)
+        if torque >= rig.config.clutch_torque:
+            return torque, rig.thread.clamp_force(rig.context)
+    raise AssertionError("the clutch did not trip")
+
+
+def leave(rig: ThreadRig) -> None:
+    """Lock the thread, stop the spindle, take the bit away."""
+    rig.thread.lock(rig.root)
+    rig.driver.command(rig.root, 0.0)
+    rig.step(50)
+    rig.thread.release_bit(rig.root)
+    for _ in range(150):
+        rig.move_bit(0.1)
+        rig.step()
+
+
+@pytest.fixture(scope="module")
+def story() -> Story:
+    rig = ThreadRig()
+    rig.step(50)
+    resting_misfit, _ = rig.thread.thread_misfit(rig.context)
+    caught_without_bit = rig.thread.try_catch(rig.root)
+    high_bit_engaged = rig.thread.try_engage_bit(rig.root)
+    loose_mass = mass(rig)
+    bit_misfit = engage_bit(rig)
+    thread_misfit = catch_thread(rig)
+    helix = run_down(rig)
+    torque, clamp_at_trip = tighten(rig)
+    driven_mass = mass(rig)
+    leave(rig)
+    return Story(
+        rig=rig,
+        loose_mass=loose_mass,
+        driven_mass=driven_mass,
+        high_bit_engaged=high_bit_engaged,
+        resting_misfit=resting_misfit,
+        caught_without_bit=caught_without_bit,
+        bit_misfit=bit_misfit,
+        thread_misfit=thread_misfit,
+        helix=helix,
+        torque=torque,
+        clamp_at_trip=clamp_at_trip,
+        clamp_after=rig.thread.clamp_force(rig.context),
+    )
+
+
+def test_bit_engages_only_within_its_gate(story: Story) -> None:
+    assert not story.high_bit_engaged
+    assert story.bit_misfit.within(BIT_GATE)
+
+
+def test_thread_catches_only_within_its_gate_and_only_with_the_bit_on(story: Story) -> None:
+    """A loose bolt stands on the mouth of its thread, well inside the gate, and stays loose."""
+    assert story.resting_misfit.within(THREAD_GATE)
+    assert not story.caught_without_bit
+    assert story.thread_misfit.within(THREAD_GATE)
+
+
+def test_bolt_advances_one_pitch_per_turn(story: Story) -> None:
+    turns, advance = story.helix.T
+    assert turns[-1] > 8
+    slope = np.polyfit(turns, advance, 1)[0]
+    assert slope == pytest.approx(story.rig.fastener.pitch, rel=0.02)
+
+
+def test_clamp_force_follows_the_torque(story: Story) -> None:
+    """F = T / (K d): friction under the head, by contact, makes what K says."""
+    fastener = story.rig.fastener
+    expected = story.torque / (fastener.nut_factor * fastener.diameter)
+    assert story.clamp_at_trip == pytest.approx(expected, rel=0.15)
+
+
+def test_clamp_force_stays_when_the_bit_leaves(story: Story) -> None:
+    assert story.rig.thread.state is ThreadState.LOCKED
+    assert story.rig.thread.bit_position is None
+    assert story.clamp_after == pytest.approx(story.clamp_at_trip, rel=0.10)
+
+
+def test_only_an_engaged_bolt_has_added_inertia(story: Story) -> None:
+    real = story.rig.bolt.default_mass()
+    assert story.loose_mass == pytest.approx(real, rel=1e-12)
+    assert story.driven_mass == pytest.approx(ENGAGED_MASS_FACTOR * real, rel=1e-12)
+
+
+def test_plate_is_pressed_onto_the_motor(story: Story) -> None:
+    """One bolt, off the centre, clamps the plate where it lies: no shift beyond the fit's play."""
+    X_WPlate = story.rig.plant.EvalBodyPoseInWorld(story.rig.context, story.rig.plate)
+    assert np.linalg.norm(X_WPlate.translation()) < 0.15e-3
+
+
+def test_loosened_bolt_has_its_own_inertia_and_turns_freely() -> None:
+    rig = ThreadRig()
+    rig.thread.restore(rig.root, ThreadState.CAUGHT, 2, 0.0)
+    assert mass(rig) > rig.bolt.default_mass()
+    rig.thread.reset(rig.root)
+    inertia = rig.bolt.CalcSpatialInertiaInBodyFrame(rig.context)
+    real = rig.bolt.default_spatial_inertia()
+    np.testing.assert_allclose(
+        inertia.CopyToFullMatrix6(), real.CopyToFullMatrix6(), rtol=1e-9, atol=1e-15
+    )
+    assert not rig.thread.try_catch(rig.root)
+
+
+def test_thread_catches_on_its_helix_and_nowhere_else() -> None:
+    rig = ThreadRig()
+    X_WH = rig.product.parts["bolt_1"].X_AP
+    for turns, above in ((0.0, 0.0), (0.3, 0.0), (3.8, 0.0), (3.8, 1e-4), (7.5, -1e-4)):
+        z = turns * rig.fastener.pitch + above
+        R_HF = RotationMatrix.MakeZRotation(2 * np.pi * turns)
+        rig.plant.SetFreeBodyPose(rig.context, rig.bolt, X_WH @ RigidTransform(R_HF, [0, 0, z]))
+        rig.thread.restore(rig.root, ThreadState.FREE, 0, 0.0)
+        misfit, theta = rig.thread.thread_misfit(rig.context)
+        assert theta == pytest.approx(2 * np.pi * turns, abs=1e-9)
+        assert misfit.axial == pytest.approx(above, abs=1e-9)
+        assert rig.thread.try_catch(rig.root) == (above == 0.0)
+
+
+@pytest.mark.parametrize("error", ["axial", "lateral", "tilt", "angle"])
+def test_every_error_alone_keeps_a_gate_shut(error: str) -> None:
+    gate = Gate(axial=1e-3, lateral=1e-3, tilt=0.1, angle=0.1)
+    fits = Misfit(0.9e-3, 0.9e-3, 0.09, 0.09)
+    assert fits.within(gate)
+    assert not replace(fits, **{error: 0.2}).within(gate)
+    if error in ("axial", "angle"):
+        assert not replace(fits, **{error: -0.2}).within(gate)
+
+
+def test_misfit_measures_what_was_put_in() -> None:
+    R = RotationMatrix.MakeZRotation(0.2) @ RotationMatrix.MakeXRotation(0.1)
+    misfit = Misfit.between(RigidTransform(R, [3e-3, 4e-3, -1e-3]))
+    assert misfit.axial == pytest.approx(-1e-3)
+    assert misfit.lateral == pytest.approx(5e-3)
+    assert misfit.tilt == pytest.approx(0.1)
+    assert misfit.angle == pytest.approx(0.2)
