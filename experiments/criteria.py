@@ -1,0 +1,80 @@
+"""When an operation counts as a success: every limit in one table, with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from planning.operations import Operation
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A bound on one measured quantity.
+
+    Attributes:
+        kind: Kind of the operation.
+        quantity: Its name; with ``each``, it is measured for every part of the operation.
+        limit: Largest magnitude that passes, in the unit of the quantity.
+        reason: Why this much.
+        each: Whether it holds for every part.
+    """
+
+    kind: str
+    quantity: str
+    limit: float
+    reason: str
+    each: bool = False
+
+
+@dataclass(frozen=True)
+class FailedCheck:
+    """A quantity outside of its limit, or that could not be measured (value None)."""
+
+    quantity: str
+    value: float | None
+    limit: float
+    reason: str
+
+
+STILL = "the jig is the fixture of every later step, and the plan knows where it holds the part"
+LIMITS = (
+    Limit("pick_place", "position_error_m", 3e-3, "later grasps are planned around the place"),
+    Limit("pick_place", "angle_error_rad", np.deg2rad(3.0), "later grasps are planned around it"),
+    Limit("pick_place", "upright_tilt_rad", np.deg2rad(5.0), "the wrist still reaches the shaft"),
+    Limit("pick_place", "speed_after_1_s_m_per_s", 1e-3, "a part that creeps is not fixed"),
+    Limit("insert_shaft", "gap_m", 2e-4, "a tightened bolt closes it without bending the plate"),
+    Limit("insert_shaft", "tilt_rad", np.deg2rad(1.0), "0.5 mm at the bolt circle: bolts stand"),
+    Limit("insert_shaft", "insertion_force_peak_N", 30.0, "less than what pushes parts off jigs"),
+    Limit("insert_shaft", "base_moved_since_placed_m", 1e-3, STILL),
+    Limit("insert_shaft", "base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
+    Limit("place_bolts", "standing_axial_m", 1e-3, "the bit finds the socket", each=True),
+    Limit("place_bolts", "standing_lateral_m", 1e-3, "the bit finds the socket", each=True),
+    Limit("place_bolts", "standing_tilt_rad", np.deg2rad(5.0), "the thread catches", each=True),
+    Limit("place_bolts", "base_moved_since_placed_m", 1e-3, STILL),
+    Limit("place_bolts", "base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
+    Limit("tighten_bolts", "torque_deviation", 0.10, "what clutch drivers repeat", each=True),
+    Limit("tighten_bolts", "advance_deviation", 0.02, "the bolt follows its helix", each=True),
+    Limit("tighten_bolts", "clamp_deviation", 0.15, "against T / (K d); K scatters so", each=True),
+    Limit("tighten_bolts", "base_moved_since_placed_m", 1e-3, STILL),
+    Limit("tighten_bolts", "base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
+)
+
+
+def failed_checks(operation: Operation, measured: Mapping[str, float]) -> tuple[FailedCheck, ...]:
+    """Return every limit of an operation that its measured quantities do not keep."""
+    failed = []
+    for limit in LIMITS:
+        for name in _names(limit, operation):
+            value = measured.get(name)
+            if value is None or not abs(value) <= limit.limit:
+                failed.append(FailedCheck(name, value, limit.limit, limit.reason))
+    return tuple(failed)
+
+
+def _names(limit: Limit, operation: Operation) -> Iterator[str]:
+    if limit.kind == operation.kind:
+        parts = operation.parts if limit.each else ()
+        yield from [f"{part}/{limit.quantity}" for part in parts] or [limit.quantity]

@@ -1,0 +1,164 @@
+"""``result.json``, ``log.npz``, ``report.html`` and saved states of a run."""
+
+from __future__ import annotations
+
+import platform
+from dataclasses import asdict
+from importlib.metadata import PackageNotFoundError, version
+from typing import Any
+
+import numpy as np
+
+from cell.state import State
+from experiments.job import Job
+from experiments.metrics import INSERTION_PHASES, insertion_curve, thread_curve
+from experiments.output import write_arrays, write_json
+from experiments.pictures import Pictures
+from experiments.plots import plot_force_plate, plot_insertion_force, plot_torque
+from experiments.prepare import Disturbance
+from experiments.record import Arrays, rows_of
+from experiments.report import Picture, write_report
+from experiments.run import Run, StepResult, final_state
+from planning.plan_file import plan_to_dict
+from planning.planner import FixingPlan
+
+PACKAGES = ("soft-jig-cell", "drake", "numpy", "scipy", "ompl", "trimesh")
+FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
+
+
+def versions() -> dict[str, str]:
+    """Return the versions of Python and of what decides the outcome."""
+    found = {"python": platform.python_version()}
+    for package in PACKAGES:
+        try:
+            found[package] = version(package)
+        except PackageNotFoundError:  # The source tree, not installed.
+            found[package] = "unknown"
+    return found
+
+
+def write_infeasible(job: Job, fixing: FixingPlan, reason: str) -> None:
+    """Write the result of an order that cannot be carried out."""
+    _remove_former(job)
+    result = _summary(job, fixing, "failure") | {
+        "steps": [],
+        "failure": {"phase": "plan", "evidence": reason},
+    }
+    write_json(job.out / "result.json", result)
+
+
+def write_results(job: Job, fixing: FixingPlan, run: Run, pictures: Pictures) -> None:
+    """Write everything that a run leaves behind."""
+    _remove_former(job)
+    result = _result(job, fixing, run)
+    log = run.simulation.log.arrays()
+    write_arrays(job.out / "log.npz", log)
+    if run.failure is None:
+        _write_state(job, "state.npz", final_state(run))
+    else:
+        _write_state(job, "failed_state.npz", run.failure.state)
+    write_report(
+        job.out / "report.html",
+        title=f"{job.product.name}: {job.command}",
+        plan=plan_to_dict(fixing),
+        result=result,
+        pictures=pictures.taken,
+        plots=_plots(run, log),
+        notes=_notes(run, pictures),
+    )
+    # Last: whoever finds it finds the rest, too.
+    write_json(job.out / "result.json", result)
+
+
+def _remove_former(job: Job) -> None:
+    """An earlier run's files must not be taken for this one's."""
+    for name in FILES:
+        (job.out / name).unlink(missing_ok=True)
+
+
+def _write_state(job: Job, name: str, state: State) -> None:
+    write_arrays(job.out / name, state)
+
+
+def _summary(job: Job, fixing: FixingPlan, verdict: str) -> dict[str, Any]:
+    return {
+        "command": job.command,
+        "product": job.product.name,
+        "order": list(fixing.order),
+        "seed": job.seed,
+        "verdict": verdict,
+        "config": job.config.to_dict(),
+        "versions": versions(),
+    }
+
+
+def _result(job: Job, fixing: FixingPlan, run: Run) -> dict[str, Any]:
+    simulation = run.simulation
+    began = run.records[0].start.time if run.records else 0.0
+    result = _summary(job, fixing, run.verdict) | {
+        "steps": [_step(step) for step in run.steps],
+        "real_time_factor": (simulation.time - began) / max(simulation.stepping_cpu, 1e-9),
+        "sim_seconds": simulation.time - began,
+        "disturbance": asdict(Disturbance.draw(job.config, job.seed)),
+    }
+    if run.failure is not None:
+        result["failure"] = {
+            "phase": run.failure.phase,
+            "evidence": run.failure.evidence,
+            "state": "failed_state.npz",
+        }
+    return result
+
+
+def _step(step: StepResult) -> dict[str, Any]:
+    return asdict(step) | {"failed_checks": [asdict(check) for check in step.failed_checks]}
+
+
+def _notes(run: Run, pictures: Pictures) -> list[str]:
+    notes = []
+    if run.failure is not None:
+        notes.append(f"Failed in '{run.failure.phase}': {run.failure.evidence}")
+    for step in run.steps:
+        for check in step.failed_checks:
+            value = "not measured" if check.value is None else f"{check.value:.4g}"
+            notes.append(
+                f"{step.name}: {check.quantity} is {value}, limit {check.limit:.4g}: {check.reason}"
+            )
+    if pictures.problem is not None:
+        notes.append(f"No pictures: {pictures.problem}.")
+    return notes
+
+
+def _plots(run: Run, log: Arrays) -> list[Picture]:
+    if "time" not in log:
+        return []
+    starts = [(record.operation.name, record.start.time) for record in run.records]
+    force = log["force_plate"][:, 3:] - log["force_plate"][0, 3:]
+    plots = [("Force plate", plot_force_plate(log["time"], force, starts))]
+    for record in run.records:
+        fit = record.operation.fit
+        if fit is not None and record.named(fit.hole, *INSERTION_PHASES):
+            depth, force = insertion_curve(run.simulation.cell, record, log)
+            limit = run.station.config.insertion.force_limit
+            plots.append((record.operation.name, plot_insertion_force(depth, force, limit)))
+        if record.operation.kind == "tighten_bolts":
+            plots += _torque_plot(run, log)
+    return plots
+
+
+def _torque_plot(run: Run, log: Arrays) -> list[Picture]:
+    record = run.records[-1]
+    angles: dict[str, np.ndarray] = {}
+    torques: dict[str, np.ndarray] = {}
+    for bolt in record.operation.parts:
+        phases = record.named(bolt, "run down", "tighten")
+        if len(phases) == 2:
+            rows = rows_of(log, phases)
+            angle, _, clamp = thread_curve(run.simulation.cell, bolt, rows)
+            angles[bolt] = angle - angle[0]
+            torques[bolt] = rows["spindle_torque"][-len(clamp) :]
+    return [("Tightening", plot_torque(angles, torques, _torque(run)))] if angles else []
+
+
+def _torque(run: Run) -> float:
+    return run.station.config.driver.clutch_torque
