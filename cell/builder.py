@@ -9,7 +9,7 @@ from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
 from pydrake.multibody.tree import RigidBody, WeldJoint
-from pydrake.systems.framework import Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.arm import Arm, Drive, add_arm
 from cell.config import CellConfig
@@ -77,6 +77,19 @@ class Cell:
         """Pose of the jig frame while the base is bolted to the force plate."""
         return self.config.workcell.X_WJ
 
+    def reset(self, root: Context) -> None:
+        """Put a new Context into the initial state: threads open, parts asleep, bag inflated.
+
+        Drake has every constraint active in a default Context, those of all threads and bits too.
+
+        Args:
+            root: Context of the diagram that the cell was built into.
+        """
+        for thread in self.threads.values():
+            thread.reset(root)
+        self.parts.sleep_all_but(root, ())
+        self.soft_jig.inflate(root)
+
 
 def build_cell(config: CellConfig, product: Product) -> Cell:
     """Build the simulated cell for one product, as a diagram of its own."""
@@ -86,7 +99,11 @@ def build_cell(config: CellConfig, product: Product) -> Cell:
 
 
 def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> Cell:
-    """Add the cell to a caller's diagram; with nothing else connected the arms hold."""
+    """Add the cell to a caller's diagram; with nothing else connected the arms hold.
+
+    Reset each Context with `Cell.reset` before it is stepped. The diagram owns all that it steps
+    with; the cell is needed for handles only.
+    """
     plant, scene_graph = AddMultibodyPlant(_plant_config(config), builder)
     plate_weld, jig_base = add_workcell(plant, config, product)
     left, right = add_arms(plant, config)

@@ -132,7 +132,7 @@ class MotionConfig:
         above=0.0, at_most=1.0,
     )  # fmt: skip
     acceleration_limit: float = setting(6.0, "rad/s2", "Of every joint [A].", above=0.0)
-    arm_clearance: float = setting(0.02, "m", "Kept between the arms [A].", at_least=0.0)
+    arm_clearance: float = setting(0.01, "m", "Kept between the arms [A].", at_least=0.0)
     obstacle_clearance: float = setting(
         0.005, "m", "Kept between robot and surroundings [A].", at_least=0.0
     )

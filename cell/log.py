@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 
 class Log:
@@ -18,7 +19,7 @@ class Log:
         self._rows: dict[str, list[np.ndarray]] = {}
         self.phases: list[tuple[str, float]] = []
 
-    def append(self, **values: np.ndarray | float) -> None:
+    def append(self, **values: ArrayLike) -> None:
         """Add one row; every row must have the same names."""
         for name, value in values.items():
             self._rows.setdefault(name, []).append(np.array(value, dtype=float))

@@ -128,13 +128,15 @@ class Parts:
         asleep = [part for part in self if part.asleep]
         for part in asleep:
             part.show(root)
-        yield
-        for part in asleep:
-            part.hide(root)
+        try:
+            yield
+        finally:
+            for part in asleep:
+                part.hide(root)
 
     def sleep_all_but(self, root: Context, awake: Iterable[str]) -> None:
         """Wake the named parts and let every other one sleep."""
-        names = set(awake)
+        names = {self[name].part.name for name in awake}
         for name, part in self.by_name.items():
             if name in names:
                 part.wake(root)

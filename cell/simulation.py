@@ -57,10 +57,7 @@ class Simulation:
         self.stepping_cpu = 0.0
         self.steps = 0
         self._bed_pushes = False
-        for thread in cell.threads.values():
-            thread.reset(self.root)
-        cell.parts.sleep_all_but(self.root, ())
-        cell.soft_jig.inflate(self.root)
+        cell.reset(self.root)
         self.simulator.Initialize()
 
     @property

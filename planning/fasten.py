@@ -216,33 +216,34 @@ def tighten_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     """Yield the phases that drive one bolt home."""
     thread = station.cell.threads[bolt]
     driver = station.config.driver
-    bit = station.arm("right").frame("bit_tip")
+    tip = station.arm("right").frame("tool_tip")
     awake = frozenset([bolt, *station.fixed, *_driven(station)])
     X_WE = _socket_pose(station, bolt)
     near = station.arm("right").positions(station.context)
     above = backed_off(X_WE, BIT_HOVER)
-    (q_above, *_) = _configurations_about(station, bit, above, near)
+    holding = [("left_tool", part) for part in station.fixed]
+    (q_above, *_) = _configurations_about(station, tip, above, near, holding)
     yield Phase(
         f"{bolt}: driver above",
         motion_finished,
         timeout=20.0,
-        right=station.move("right", q_above, clearance=FINE_CLEARANCE),
+        right=station.move("right", q_above, holding, clearance=FINE_CLEARANCE),
         spindle=0.0,
-        awake=frozenset(station.fixed),
+        awake=frozenset([*station.fixed, *_driven(station)]),
     )
-    X_WBit = station.pose("right", "bit_tip")
-    X_WE = RigidTransform(X_WBit.rotation(), _socket_pose(station, bolt).translation())
+    X_WTip = station.pose("right", "tool_tip")
+    X_WE = RigidTransform(X_WTip.rotation(), _socket_pose(station, bolt).translation())
     yield Phase(
         f"{bolt}: bit into socket",
         lambda sensed: sensed.finished and thread.bit_position is not None,
         timeout=5.0,
-        right=station.line("right", bit, X_WE, speed=SLOW),
+        right=station.line("right", tip, X_WE, speed=SLOW),
         spindle=FIND_SPEED,
         every_step=lambda simulation: _engage(simulation, thread),
         awake=awake,
     )
     X_WDeep = RigidTransform(X_WE.rotation(), X_WE.translation() - [0.0, 0.0, FEED_DEPTH])
-    line = station.line("right", bit, X_WDeep, speed=SLOW)
+    line = station.line("right", tip, X_WDeep, speed=SLOW)
     feed = Follow(Feed(line, FEED_DEPTH, driver.push_force, station.config.simulation.time_step))
     yield Phase(
         f"{bolt}: run down",
@@ -270,12 +271,12 @@ def tighten_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         start=(lambda simulation: thread.lock(simulation.root),),
         awake=awake,
     )
-    X_WBit = station.pose("right", "bit_tip")
+    X_WTip = station.pose("right", "tool_tip")
     yield Phase(
         f"{bolt}: driver off",
         motion_finished,
         timeout=5.0,
-        right=station.line("right", bit, backed_off(X_WBit, BIT_HOVER + FEED_DEPTH), speed=0.1),
+        right=station.line("right", tip, backed_off(X_WTip, BIT_HOVER + FEED_DEPTH), speed=0.1),
         start=(lambda simulation: thread.release_bit(simulation.root),),
         awake=awake,
     )
@@ -305,11 +306,15 @@ def _socket_pose(station: Station, bolt: str) -> RigidTransform:
 
 
 def _configurations_about(
-    station: Station, bit: Frame, X_WE: RigidTransform, near: np.ndarray
+    station: Station,
+    tip: Frame,
+    X_WE: RigidTransform,
+    near: np.ndarray,
+    may_touch: list[tuple[str, str]],
 ) -> list[np.ndarray]:
     """Return configurations with the driver turned any way about its own axis, nearest first."""
     found = []
     for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
         X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
-        found += station.configurations("right", bit, X, near, clearance=FINE_CLEARANCE)
+        found += station.configurations("right", tip, X, near, may_touch, clearance=FINE_CLEARANCE)
     return sorted(found, key=lambda q: float(np.max(np.abs(q - near))))

@@ -23,6 +23,7 @@ from planning.motion import plan_line, plan_path
 from planning.timing import JointMotion, time_path
 
 SINGULAR_SINE = 0.2  # Of wrist 2 and of the elbow [A].
+WOUND_UP = np.deg2rad(310.0)  # Joints turn by 360 degrees either way [A].
 
 
 def collision_model(config: CellConfig, product: Product) -> CollisionModel:
@@ -206,11 +207,13 @@ class Station:
 
 
 def is_regular(q: np.ndarray) -> bool:
-    """Return whether the arm is well away from its wrist and elbow singularities.
+    """Return whether the arm is well away from its singularities and from winding itself up.
 
-    Close to one, a straight line of the tool asks for large turns of the joints.
+    Close to a singularity of wrist or elbow, a straight line of the tool asks for large turns of
+    the joints; close to a joint limit it cannot go on.
     """
-    return bool(abs(np.sin(q[4])) > SINGULAR_SINE and abs(np.sin(q[2])) > SINGULAR_SINE)
+    singular = min(abs(np.sin(q[4])), abs(np.sin(q[2]))) < SINGULAR_SINE
+    return bool(not singular and np.max(np.abs(q)) < WOUND_UP)
 
 
 def slowed(motion: JointMotion, duration: float) -> JointMotion:

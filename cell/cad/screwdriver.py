@@ -70,6 +70,8 @@ def screwdriver() -> SdfModel:
     _add_bit(model)
     model.frame("mount", "body")
     model.frame("bit_tip", "bit", Pose(z=SHAFT_LENGTH))
+    # Where the bit's end is at rest: the arm aims with this frame, which does not turn.
+    model.frame("tool_tip", "body", Pose(z=BIT_TIP_Z))
     model.ignore_contact_between("driver", ["body", "bit"])
     return model
 
