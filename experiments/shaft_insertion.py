@@ -1,0 +1,14 @@
+"""Operation insert_shaft: a part with a hole onto the shaft of the part that the jig holds.
+
+    python -m experiments.shaft_insertion --out out/insertion
+    python -m experiments.shaft_insertion --start out/pick_place/state.npz --out out/insertion
+
+The first line places the part on the jig before; the second goes on from where it is placed.
+"""
+
+import sys
+
+from experiments.single import run_operation
+
+if __name__ == "__main__":
+    sys.exit(run_operation("shaft_insertion", __doc__, last="insert_shaft"))

@@ -1,0 +1,213 @@
+"""The assembly run: what it writes, how it fails, that it repeats, that it can be interrupted."""
+
+import json
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from cell.config import CellConfig
+from cell.errors import BadOrder, CellError
+from cell.loading import load_product
+from cell.phase import Outcome, Phase, after
+from cell.simulation import Simulation
+from cell.state import State, read_state, restore_state, save_state
+from experiments import run as run_module
+from experiments.assemble import run_assemble, run_job
+from experiments.job import Job
+from experiments.prepare import Disturbance, running_cell
+from experiments.run import Run, go_on
+from planning.operations import Operation, operations, phases
+from planning.planner import plan
+
+PRODUCT = load_product("motor_unit")
+CONFIG = CellConfig()
+PLACE = Operation("place motor", "pick_place", ("motor",))
+
+
+def options(out: Path, **changes: Any) -> dict[str, Any]:
+    """Return the arguments of a quiet assembly run."""
+    given = dict(product=PRODUCT, order=None, config=CONFIG, seed=0, out=out)
+    return given | dict(view=False, replay=None, quiet=True) | changes
+
+
+def result_in(out: Path) -> dict[str, Any]:
+    return json.loads((out / "result.json").read_text())
+
+
+@pytest.mark.parametrize(
+    ("order", "evidence"),
+    [
+        (("motor", "bolts", "plate"), "blocked in all six directions"),
+        (("plate", "bolts", "motor"), "one part on the jig only"),
+    ],
+)
+def test_order_that_cannot_be_carried_out_is_a_failure(
+    order: tuple[str, ...], evidence: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert run_assemble(**options(tmp_path, order=order, quiet=False)) == 1
+    assert evidence in capsys.readouterr().out
+    result = result_in(tmp_path)
+    assert result["verdict"] == "failure"
+    assert evidence in result["failure"]["evidence"]
+
+
+def test_malformed_order_is_an_error(tmp_path: Path) -> None:
+    with pytest.raises(BadOrder):
+        run_assemble(**options(tmp_path, order=("motor",)))
+    assert not list(tmp_path.iterdir())
+
+
+def test_product_without_models_is_an_error(tmp_path: Path) -> None:
+    bare = {name: replace(part, model=None) for name, part in PRODUCT.parts.items()}
+    with pytest.raises(CellError, match="can be planned, but not assembled"):
+        run_assemble(**options(tmp_path, product=replace(PRODUCT, parts=bare)))
+    assert not list(tmp_path.iterdir())
+
+
+def test_part_out_of_reach_is_a_failure_with_evidence(tmp_path: Path) -> None:
+    """Not bad input: the run says where it stopped, and leaves the state to look into."""
+    far = replace(CONFIG.workcell, p_WT=(-0.28, 1.6, 0.03))
+    (tmp_path / "report.html").write_text("of an earlier run")
+    assert run_assemble(**options(tmp_path, config=replace(CONFIG, workcell=far))) == 1
+    result = result_in(tmp_path)
+    assert result["failure"]["phase"] == "place motor: plan the next motion"
+    assert "motor" in result["failure"]["evidence"]
+    assert [step["verdict"] for step in result["steps"]] == ["failure"]
+    assert "steps" in read_state(tmp_path / "failed_state.npz")
+    assert "earlier run" not in (tmp_path / "report.html").read_text()
+
+
+def test_disturbance_is_drawn_from_the_seed() -> None:
+    """The tray moves with its parts; the planner's configuration stays as it is."""
+    one, two = (Disturbance.draw(CONFIG, seed) for seed in (1, 2))
+    assert one == Disturbance.draw(CONFIG, 1) != two
+    draws = [Disturbance.draw(CONFIG, seed) for seed in range(400)]
+    assert np.std([d.x for d in draws]) == pytest.approx(5e-4, rel=0.1)
+    assert np.std([d.yaw_deg for d in draws]) == pytest.approx(1.0, rel=0.1)
+    disturbed = one.applied_to(CONFIG)
+    assert disturbed.workcell.p_WT[0] == CONFIG.workcell.p_WT[0] + one.x
+    assert replace(disturbed, workcell=CONFIG.workcell) == CONFIG
+
+
+# With a cell.
+
+
+@pytest.fixture
+def run() -> Run:
+    return Run(*running_cell(PRODUCT, CONFIG, seed=0))
+
+
+def test_planner_does_not_know_the_disturbance(run: Run) -> None:
+    """Parts are where the tray really is; the planner's tray is where it should be."""
+    X_WT = Disturbance.draw(CONFIG, 0).applied_to(CONFIG).workcell.X_WT
+    part = PRODUCT.parts["motor"]
+    assert part.X_TrayP is not None
+    truth = run.simulation.sense("motor")
+    assert truth.IsNearlyEqualTo(X_WT @ part.X_TrayP, 1e-9)
+    assert run.station.config == CONFIG
+
+
+def test_phase_that_fails_stops_the_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The saved state is the one at the start of the phase that failed."""
+
+    def two_phases(station: object, operation: Operation) -> Iterator[Phase]:
+        yield Phase("motor: look", after(0.005), 1.0)
+        yield Phase("motor: wait", lambda sensed: False, timeout=0.01)
+
+    monkeypatch.setattr(run_module, "phases", two_phases)
+    run.run([PLACE, PLACE])
+    assert run.failure is not None
+    assert (run.verdict, len(run.steps)) == ("failure", 1)
+    assert (run.failure.phase, run.failure.evidence) == (
+        "motor: wait", "end condition not met in 0.01 s",
+    )  # fmt: skip
+    assert run.failure.state["steps"] == 5
+
+
+def test_saved_state_of_another_order_is_refused(run: Run) -> None:
+    todo = operations(PRODUCT, plan(PRODUCT))
+    with pytest.raises(CellError, match="after insert plate; the plan begins with place motor"):
+        go_on(run, todo, {"operations_done": np.array(["insert plate"])})
+
+
+def some_phases(run: Run, count: int) -> Iterator[Phase]:
+    """Yield the first phases of placing the motor."""
+    pending = phases(run.station, PLACE)
+    outcome: Outcome | None = None
+    for _ in range(count):
+        outcome = yield next(pending) if outcome is None else pending.send(outcome)  # type: ignore
+
+
+def test_same_seed_is_bit_identical(run: Run) -> None:
+    """Planning with sampling included: look, approach, descend."""
+    again = Run(*running_cell(PRODUCT, CONFIG, seed=0))
+    for one in (run, again):
+        one.simulation.run(some_phases(one, 3))
+    log, other = run.simulation.log.arrays(), again.simulation.log.arrays()
+    assert log.keys() == other.keys()
+    assert all(np.array_equal(log[name], other[name]) for name in log)
+
+
+# With a part on the jig.
+
+
+@pytest.fixture(scope="module")
+def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Return the folder of a run that has placed the motor."""
+    out = tmp_path_factory.mktemp("placed")
+    job = Job(PRODUCT, None, CONFIG, 0, out, quiet=True, command="pick_place", last="pick_place")
+    assert run_job(job) == 0
+    return out
+
+
+def test_motor_is_placed_as_planned(placed: Path) -> None:
+    result = result_in(placed)
+    (step,) = result["steps"]
+    assert (result["verdict"], step["verdict"], step["failed_checks"]) == ("success", "success", [])
+    assert result["command"] == "pick_place"
+    measured = step["measured"]
+    assert 19.0 < measured["press_force_peak_N"] < 22.0  # The force that ends the pressing is 20.
+    assert 2e-3 < measured["depth_m"] < 15e-3
+    assert measured["jam_kick_m"] < 1e-3
+    assert measured["force_plate_peak_normal_N"] > 19.0
+
+
+def test_placement_leaves_log_and_report(placed: Path) -> None:
+    with np.load(placed / "log.npz") as log:
+        rows = len(log["time"])
+        assert all(len(log[name]) == rows for name in log.files if not name.startswith("phase_"))
+        assert not [name for name in log.files if "cpu" in name or "wall" in name]
+        assert "motor: press" in log["phase_name"]
+    page = (placed / "report.html").read_text()
+    assert "place motor" in page
+    assert "position_error_m" in page or "position error m" in page
+
+
+def test_interrupted_run_continues_bit_identically(placed: Path) -> None:
+    """With the motor awake on the frozen bed, and a save in the middle."""
+    hold = Phase("motor: rest", after(0.05), 1.0, awake=frozenset(["motor"]), fine_log=True)
+
+    def rest(simulation: Simulation) -> State:
+        simulation.run_phase(hold)
+        return save_state(simulation)
+
+    simulations = [running_cell(PRODUCT, CONFIG, seed=0)[0] for _ in range(2)]
+    restore_state(simulations[0], read_state(placed / "state.npz"))
+    middle = rest(simulations[0])
+    restore_state(simulations[1], middle)
+    one, two = (rest(simulation) for simulation in simulations)
+    assert one["steps"] == two["steps"]
+    assert all(np.array_equal(one[name], two[name]) for name in one)
+
+
+@pytest.mark.slow
+def test_whole_assembly_succeeds(tmp_path: Path) -> None:
+    assert run_assemble(**options(tmp_path)) == 0
+    result = result_in(tmp_path)
+    kinds = [step["operation"] for step in result["steps"]]
+    assert kinds == ["pick_place", "insert_shaft", "place_bolts", "tighten_bolts"]
+    assert not [check for step in result["steps"] for check in step["failed_checks"]]

@@ -1,0 +1,173 @@
+"""What an assembly is judged by, on states made by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cell.loading import load_product
+from experiments.criteria import LIMITS, failed_checks
+from experiments.metrics import (
+    advance,
+    clamp_target,
+    force_plate_peaks,
+    moved,
+    placement_errors,
+    seat_errors,
+    standing,
+    torque_shares,
+    trip,
+)
+from experiments.record import PhaseRecord, rows_between
+from experiments.snapshot import Snapshot, Wrench
+from planning.operations import Operation
+
+PRODUCT = load_product("motor_unit")
+BOLT = PRODUCT.fasteners["bolt_1"]
+
+
+def snapshot(**changes) -> Snapshot:
+    """Return the assembled product with its frame A turned and moved in W, at rest."""
+    X_WA = RigidTransform(RollPitchYaw(0.0, 0.0, 0.7), [0.1, 0.2, 0.3])
+    state = Snapshot(
+        time=1.0,
+        X_WJ=RigidTransform([0.0, 0.15, 0.2]),
+        X_WP={name: X_WA @ part.X_AP for name, part in PRODUCT.parts.items()},
+        V_WP={name: np.zeros(6) for name in PRODUCT.parts},
+        X_HF=dict.fromkeys(PRODUCT.fasteners, RigidTransform()),
+        turns=dict.fromkeys(PRODUCT.fasteners, 10.0),
+        clamp=dict.fromkeys(PRODUCT.fasteners, clamp_target(BOLT)),
+        spindle_torque=0.5,
+        wrenches={},
+        hand_clearance={"motor": 0.002},
+    )
+    return replace(state, **changes)
+
+
+def moved_part(state: Snapshot, part: str, X: RigidTransform) -> Snapshot:
+    """Return the state with a part displaced by X in its own frame."""
+    return replace(state, X_WP={**state.X_WP, part: state.X_WP[part] @ X})
+
+
+def test_assembled_product_has_no_gap_and_no_tilt() -> None:
+    assert seat_errors(PRODUCT, PRODUCT.fits[0], snapshot()) == pytest.approx((0, 0), abs=1e-9)
+
+
+def test_gap_is_along_the_axis_and_at_the_hole() -> None:
+    """A plate that is lifted by 0.3 mm, shifted and turned about the axis has a gap of 0.3 mm."""
+    X = RigidTransform(RollPitchYaw(0.0, 0.0, 0.2), [1e-3, -2e-3, 3e-4])
+    gap, tilt = seat_errors(PRODUCT, PRODUCT.fits[0], moved_part(snapshot(), "plate", X))
+    assert gap == pytest.approx(3e-4)
+    assert tilt == pytest.approx(0.0, abs=1e-7)
+
+
+def test_tilt_counts_whatever_its_direction() -> None:
+    for rpy in ([0.01, 0.0, 0.0], [0.0, -0.01, 0.0]):
+        turned = RigidTransform(RollPitchYaw(rpy), np.zeros(3))
+        _, tilt = seat_errors(PRODUCT, PRODUCT.fits[0], moved_part(snapshot(), "plate", turned))
+        assert tilt == pytest.approx(0.01)
+
+
+def test_motion_is_relative_to_the_jig() -> None:
+    """What moves together with the jig has not moved."""
+    before = snapshot()
+    shake = RigidTransform(RollPitchYaw(0.0, 0.1, 0.2), [0.01, 0.02, 0.0])
+    together = replace(
+        before,
+        X_WJ=shake @ before.X_WJ,
+        X_WP={name: shake @ X_WP for name, X_WP in before.X_WP.items()},
+    )
+    assert moved("motor", before, together) == pytest.approx((0.0, 0.0), abs=1e-7)
+    slipped = moved_part(before, "motor", RigidTransform(RollPitchYaw(0.03, 0, 0), [0, 1e-3, 0]))
+    assert moved("motor", before, slipped) == pytest.approx((1e-3, 0.03))
+
+
+def test_placement_is_judged_sideways_by_angle_and_by_tilt() -> None:
+    planned = RigidTransform(RollPitchYaw(0.0, 0.0, 1.0), [0.0, 0.15, 0.3])
+    tilted = (
+        RollPitchYaw(0.0, 0.0, 1.0).ToRotationMatrix()
+        @ RollPitchYaw(0.03, 0.0, 0.0).ToRotationMatrix()
+    )
+    errors = placement_errors(planned, RigidTransform(tilted, [3e-4, 0.15 + 4e-4, 0.28]))
+    assert errors["position_error_m"] == pytest.approx(5e-4)
+    assert errors["angle_error_rad"] == pytest.approx(0.03)
+    assert errors["upright_tilt_rad"] == pytest.approx(0.03)
+    yawed = RigidTransform(RollPitchYaw(0.0, 0.0, 1.05), planned.translation())
+    errors = placement_errors(planned, yawed)
+    assert errors["angle_error_rad"] == pytest.approx(0.05)
+    assert errors["upright_tilt_rad"] == pytest.approx(0.0, abs=1e-7)
+
+
+def test_bolt_stands_on_the_mouth_of_its_thread() -> None:
+    X_HF = RigidTransform([2e-4, 0.0, BOLT.thread_depth + 1e-4])
+    errors = standing(BOLT, X_HF)
+    assert errors["standing_axial_m"] == pytest.approx(1e-4)
+    assert errors["standing_lateral_m"] == pytest.approx(2e-4)
+
+
+def test_clamp_force_is_compared_with_the_nut_factor() -> None:
+    """0.5 N m on an M3 with K = 0.202 is 825 N."""
+    assert clamp_target(BOLT) == pytest.approx(825.1, abs=0.1)
+    measured = trip(BOLT, snapshot(), snapshot())
+    assert measured["clamp_deviation"] == pytest.approx(0.0)
+    assert measured["torque_deviation"] == pytest.approx(0.0)
+
+
+def test_shares_of_torque_add_up_to_the_torque() -> None:
+    """A torque about the bolt's axis is shared, wherever the sensors are, whatever was before."""
+    before = snapshot(wrenches={name: _wrench(0.1) for name in ("left", "force_plate")})
+    p_WB = before.X_WP["bolt_1"].translation()
+    # The left arm takes 0.2 N m by a force of 2 N at a lever of 0.1 m, the jig the rest.
+    left = Wrench(np.array([0.0, 0.0, 0.1]), np.array([0.0, -2.0, 0.0]), p_WB + [0.1, 0.0, 0.05])
+    after = snapshot(wrenches={"left": left, "force_plate": _wrench(0.1 - 0.3)})
+    shares = torque_shares(BOLT, PhaseRecord(before, after, {}))
+    assert shares["left_arm_torque_share"] == pytest.approx(0.4)
+    assert shares["jig_torque_share"] == pytest.approx(0.6)
+
+
+def _wrench(torque_z: float) -> Wrench:
+    return Wrench(np.array([0.0, 0.0, torque_z]), np.zeros(3), np.array([1.0, 2.0, 3.0]))
+
+
+def test_advance_is_the_slope_before_the_bolt_is_snug() -> None:
+    """After that the bolt turns against its own stretch: that part must not count."""
+    angle = np.linspace(0.0, 10 * 2 * np.pi, 200)
+    height = 5e-3 - BOLT.pitch * angle / (2 * np.pi)
+    clamp = np.zeros(200)
+    angle = np.append(angle, angle[-1] + [0.1, 0.2])
+    height, clamp = np.append(height, [0.0, 0.0]), np.append(clamp, [300.0, 800.0])
+    measured = advance(BOLT, angle, height, clamp)
+    assert measured["advance_per_turn_m"] == pytest.approx(BOLT.pitch)
+    assert measured["snug_to_trip_rad"] == pytest.approx(0.1)
+    assert advance(BOLT, angle[:2], height[:2], clamp[:2]) == {}
+
+
+def test_peaks_of_the_force_plate_leave_out_the_weight_of_the_jig() -> None:
+    rest = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -50.0])
+    wrench = rest + [[0, 0, 0.2, 3.0, 4.0, -20.0], [0, 0, -0.4, 0.0, 0.0, 5.0]]
+    peaks = force_plate_peaks(wrench, rest)
+    assert peaks["force_plate_peak_normal_N"] == pytest.approx(20.0)
+    assert peaks["force_plate_peak_shear_N"] == pytest.approx(5.0)
+    assert peaks["force_plate_peak_torque_z_N_m"] == pytest.approx(0.4)
+
+
+def test_rows_of_an_interval_leave_out_its_start() -> None:
+    log = {"time": np.array([0.1, 0.2, 0.3]), "phase_start": np.zeros(1)}
+    assert rows_between(log, 0.1, 0.3)["time"].tolist() == [0.2, 0.3]
+
+
+def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
+    insertion = Operation("insert plate", "insert_shaft", ("plate",))
+    limits = {limit.quantity: limit.limit for limit in LIMITS if limit.kind == insertion.kind}
+    assert not failed_checks(insertion, limits)
+    (failed,) = failed_checks(insertion, limits | {"gap_m": -1.0})
+    assert (failed.quantity, failed.value) == ("gap_m", -1.0)
+    (failed,) = failed_checks(insertion, {k: v for k, v in limits.items() if k != "tilt_rad"})
+    assert (failed.quantity, failed.value) == ("tilt_rad", None)
+
+
+def test_limits_of_bolts_hold_for_each() -> None:
+    operation = Operation("tighten bolts", "tighten_bolts", ("bolt_1", "bolt_2"))
+    failed = [check.quantity for check in failed_checks(operation, {})]
+    assert {"bolt_1/torque_deviation", "bolt_2/torque_deviation"} <= set(failed)
