@@ -85,9 +85,13 @@ class Cell:
         Args:
             root: Context of the diagram that the cell was built into.
         """
+        self.parts.reset(root)
         for thread in self.threads.values():
             thread.reset(root)
-        self.parts.sleep_all_but(root, ())
+        for arm in self.arms.values():
+            arm.use_position_drive()
+        for body in self.soft_jig.pressing:
+            self.soft_jig.release(body)
         self.soft_jig.inflate(root)
 
 

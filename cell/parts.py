@@ -79,6 +79,11 @@ class LoosePart:
             self.show(root)
             self.joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
 
+    def reset(self, root: Context) -> None:
+        """Sleep in a Context where nothing is known of this part yet, or where it sleeps."""
+        self.show(root)
+        self.sleep(root)
+
     def hide(self, root: Context) -> None:
         """Filter every contact of the part."""
         geometries = GeometrySet(self.plant.GetCollisionGeometriesForBody(self.body))
@@ -133,6 +138,11 @@ class Parts:
         finally:
             for part in asleep:
                 part.hide(root)
+
+    def reset(self, root: Context) -> None:
+        """Let every part sleep, in a new Context too."""
+        for part in self:
+            part.reset(root)
 
     def sleep_all_but(self, root: Context, awake: Iterable[str]) -> None:
         """Wake the named parts and let every other one sleep."""

@@ -77,6 +77,8 @@ def restore_state(simulation: Simulation, state: State) -> None:
         part.wake(root)
         if state[f"pressing/{part.part.name}"]:
             press_into_bed(simulation, part.part.name)
+        else:
+            cell.soft_jig.release(part.body)
     cell.soft_jig.restore_state(root, _nested(state, "jig"))
     simulation.apply_bed_forces()
     for part in cell.parts:

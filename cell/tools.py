@@ -103,8 +103,10 @@ def set_driver_gains(plant: MultibodyPlant, instance: ModelInstanceIndex) -> Non
 def connect_gripper(
     builder: DiagramBuilder, plant: MultibodyPlant, instance: ModelInstanceIndex, opening: float
 ) -> Gripper:
-    """Connect the gripper's inputs (plant finalized); it holds ``opening`` [m]."""
+    """Connect the gripper's inputs (plant finalized); it starts at and holds ``opening`` [m]."""
     finger = plant.GetJointByName("finger_left_joint", instance)
+    for joint in (finger, plant.GetJointByName("finger_right_joint", instance)):
+        joint.set_default_translation(opening / 2)
     drive = Drive.connect(builder, plant, instance, np.array([opening / 2]))
     return Gripper(plant, instance, finger, drive)
 

@@ -1,0 +1,115 @@
+"""The cell as a Drake diagram: of its own, in a caller's, from anywhere, with nothing connected."""
+
+from __future__ import annotations
+
+import gc
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+
+from cell import Cell, CellConfig, Simulation, add_cell, build_cell, load_product
+from cell.events import soften_jig
+from cell.soft_jig import JigState
+from cell.thread import ThreadState
+
+
+def caller_diagram() -> tuple[Diagram, Context]:
+    """Return a caller's diagram with a cell in it, and a reset Context; the handles are gone."""
+    builder = DiagramBuilder()
+    cell = add_cell(builder, CellConfig(), load_product("motor_unit"))
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    cell.reset(root)
+    return diagram, root
+
+
+def test_cell_is_built_from_any_working_directory(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    cell = build_cell(CellConfig.load("default"), load_product("motor_unit"))
+    assert cell.diagram is not None
+    assert {part.part.name for part in cell.parts} == set(cell.product.parts)
+    assert set(cell.threads) == set(cell.product.fasteners)
+
+
+def test_callers_diagram_steps_after_the_handles_are_dropped() -> None:
+    """Nothing that a step needs belongs to the dropped value."""
+    diagram, root = caller_diagram()
+    gc.collect()
+    simulator = Simulator(diagram, root)
+    plant = diagram.GetSubsystemByName("plant")
+    before = plant.GetPositions(plant.GetMyContextFromRoot(root))
+    simulator.AdvanceTo(0.02)
+    gc.collect()
+    simulator.AdvanceTo(0.04)
+    after = plant.GetPositions(plant.GetMyContextFromRoot(simulator.get_context()))
+    np.testing.assert_allclose(after, before, atol=1e-4)
+
+
+def test_reset_forgets_an_earlier_run(motor_unit_cell: Cell) -> None:
+    """A second simulation of a cell begins like the first, whatever happened in that."""
+    cell = motor_unit_cell
+    first = Simulation(cell)
+    cell.parts.sleep_all_but(first.root, ["motor"])
+    cell.left.use_torque_drive()
+    soften_jig("motor")(first)
+    cell.threads["bolt_1"].restore(first.root, ThreadState.CAUGHT, None, 0.0)
+    second = Simulation(cell)
+    assert all(part.asleep for part in cell.parts)
+    assert not cell.left.in_torque_drive()
+    assert cell.soft_jig.state is JigState.INFLATED
+    assert not cell.soft_jig.pressing
+    before = cell.plant.GetPositions(second.context)
+    for _ in range(5):
+        second.step()
+    np.testing.assert_allclose(cell.plant.GetPositions(second.context), before, atol=1e-6)
+
+
+def test_arms_hold_with_nothing_connected(motor_unit_cell: Cell) -> None:
+    simulation = Simulation(motor_unit_cell)
+    before = {name: arm.positions(simulation.context) for name, arm in motor_unit_cell.arms.items()}
+    for _ in range(100):
+        simulation.step()
+    for name, arm in motor_unit_cell.arms.items():
+        drift = np.abs(arm.positions(simulation.context) - before[name])
+        assert drift.max() < 1e-4, name
+        np.testing.assert_allclose(before[name], arm.home, atol=1e-12)
+
+
+def test_sleeping_cell_has_no_contact_and_moves_no_part(motor_unit_cell: Cell) -> None:
+    simulation = Simulation(motor_unit_cell)
+    poses = {p.part.name: p.X_WP(simulation.context).GetAsMatrix4() for p in motor_unit_cell.parts}
+    simulation.step()
+    for part in motor_unit_cell.parts:
+        assert part.asleep
+        np.testing.assert_array_equal(
+            part.X_WP(simulation.context).GetAsMatrix4(), poses[part.part.name]
+        )
+    port = motor_unit_cell.plant.get_contact_results_output_port()
+    contacts = port.Eval(simulation.context)
+    assert contacts.num_hydroelastic_contacts() == 0
+    assert contacts.num_point_pair_contacts() == 0
+
+
+def test_parts_awake_in_the_tray_stay_there(motor_unit_cell: Cell) -> None:
+    simulation = Simulation(motor_unit_cell)
+    names = [part.part.name for part in motor_unit_cell.parts]
+    motor_unit_cell.parts.sleep_all_but(simulation.root, names)
+    before = {name: simulation.sense(name).translation() for name in names}
+    for _ in range(100):
+        simulation.step()
+    for name in names:
+        moved = np.linalg.norm(simulation.sense(name).translation() - before[name])
+        assert moved < 0.5e-3, name
+
+
+def test_two_cells_from_one_configuration_are_alike() -> None:
+    """Rebuilding gives the same plant, down to the order of its states."""
+    one, other = (build_cell(CellConfig(), load_product("motor_unit")).plant for _ in range(2))
+    assert one.GetStateNames() == other.GetStateNames()
+    q_one, q_other = (plant.GetPositions(plant.CreateDefaultContext()) for plant in (one, other))
+    np.testing.assert_array_equal(q_one, q_other)

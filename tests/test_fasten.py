@@ -1,0 +1,46 @@
+"""Fastening: the order in which bolts are tightened."""
+
+from __future__ import annotations
+
+from types import SimpleNamespace
+from typing import cast
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from planning.fasten import star_order
+from planning.station import Station
+
+
+def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
+    """Return what `star_order` sees of a station with bolts on a circle, and their places."""
+    angles = 2 * np.pi * np.arange(count) / count
+    places = {f"bolt_{k}": np.array([np.cos(a), np.sin(a), 0.0]) for k, a in enumerate(angles)}
+    parts = {name: SimpleNamespace(X_AP=RigidTransform(p)) for name, p in places.items()}
+    return cast(Station, SimpleNamespace(part=parts.__getitem__)), places
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 6, 8])
+def test_every_bolt_comes_once_and_the_first_stays_first(count: int) -> None:
+    station, places = bolts_on_a_circle(count)
+    order = star_order(station, list(places))
+    assert sorted(order) == sorted(places)
+    assert order[0] == "bolt_0"
+
+
+def test_six_bolts_are_tightened_crosswise() -> None:
+    """Each bolt is opposite the one before, or two places on: never its neighbour."""
+    station, places = bolts_on_a_circle(6)
+    order = star_order(station, list(places))
+    ways = [
+        float(np.linalg.norm(places[a] - places[b])) for a, b in zip(order, order[1:], strict=False)
+    ]
+    opposite, two_on = 2.0, np.sqrt(3.0)
+    assert min(ways) >= two_on - 1e-9
+    assert ways[::2] == pytest.approx([opposite] * 3)
+
+
+def test_order_follows_the_bolts_as_they_are_listed() -> None:
+    station, places = bolts_on_a_circle(6)
+    assert star_order(station, list(reversed(places)))[0] == "bolt_5"
