@@ -6,6 +6,7 @@ a film: every surface that it takes is an object of its own, visible for its tim
 
 from __future__ import annotations
 
+import logging
 from pathlib import Path
 
 import numpy as np
@@ -15,11 +16,13 @@ from pydrake.geometry import (
     MeshcatVisualizer,
     MeshcatVisualizerParams,
     Rgba,
+    Role,
 )
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
 from cell.builder import Cell
-from cell.soft_jig.jig import SILICONE_COLOR
+from cell.errors import UnknownName
+from cell.soft_jig.jig import MEMBRANE, SILICONE_COLOR
 from cell.soft_jig.visual import membrane_shape
 from experiments.output import write_text
 
@@ -63,6 +66,7 @@ class Replay:
 
     def __init__(self, *, view: bool, file: Path | None) -> None:
         self.view, self.file = view, file
+        logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat reports its port.
         self.meshcat = Meshcat(MeshcatParams(show_stats_plot=False)) if view or file else None
 
     @property
@@ -76,6 +80,7 @@ class Replay:
             return
         params = MeshcatVisualizerParams(publish_period=FRAME_PERIOD)
         MeshcatVisualizer.AddToBuilder(builder, cell.scene_graph, self.meshcat, params)
+        self.meshcat.SetProperty(membrane_path(cell, params.prefix), "visible", False)
         builder.AddSystem(MembraneFilm(cell, self.meshcat))
         self.meshcat.SetCameraPose(*CAMERA)
         if self.file is not None:
@@ -89,3 +94,14 @@ class Replay:
             self.meshcat.StopRecording()
             self.meshcat.PublishRecording()
             write_text(self.file, self.meshcat.StaticHtml())
+
+
+def membrane_path(cell: Cell, prefix: str) -> str:
+    """Return where the visualizer puts the membrane that the film stands in for."""
+    inspector = cell.scene_graph.model_inspector()
+    for geometry in inspector.GetAllGeometryIds(Role.kIllustration):
+        name = inspector.GetName(geometry)
+        if name.split("::")[-1] == MEMBRANE:
+            frame = inspector.GetName(inspector.GetFrameId(geometry))
+            return f"{prefix}/{frame}/{name}".replace("::", "/")
+    raise UnknownName("visible geometry", MEMBRANE, ())

@@ -25,6 +25,8 @@ from planning.planner import FixingPlan
 PACKAGES = ("soft-jig-cell", "drake", "numpy", "scipy", "ompl", "trimesh")
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 
+ASLEEP = "A part that rests while nothing touches it sleeps: the force plate does not feel it then."
+
 
 def versions() -> dict[str, str]:
     """Return the versions of Python and of what decides the outcome."""
@@ -122,7 +124,7 @@ def _step(step: StepResult) -> dict[str, Any]:
 
 
 def _notes(run: Run, pictures: Pictures) -> list[str]:
-    notes = []
+    notes = [ASLEEP]
     if run.failure is not None:
         notes.append(f"Failed in '{run.failure.phase}': {run.failure.evidence}")
     for step in run.steps:

@@ -42,6 +42,7 @@ Array = NDArray[np.float64]
 # Collision geometries whose name starts like this touch the frozen bed; all others of the same
 # body do not.
 BED_PREFIX = "bed_"
+MEMBRANE = "soft_jig_membrane"  # Name of the visible surface.
 SILICONE_COLOR = (0.85, 0.75, 0.55, 1.0)
 
 
@@ -116,7 +117,7 @@ class SoftJig:
         )
         color = np.array(SILICONE_COLOR)
         visual_id = plant.RegisterVisualGeometry(
-            base_body, X_BJ, membrane_shape(bed), "soft_jig_membrane", color
+            base_body, X_BJ, membrane_shape(bed), MEMBRANE, color
         )
         return SoftJig(plant, scene_graph, base_body, params, X_BJ, (bed_id, visual_id), mesh)
 
