@@ -8,14 +8,13 @@ from rich.console import Console
 
 from cell.config import CellConfig
 from cell.product import Product
-from cell.state import read_state
 from experiments.job import Job
 from experiments.pictures import Pictures
 from experiments.prepare import check_models, running_cell
 from experiments.progress import Progress, result_table
 from experiments.replay import Replay
 from experiments.results import write_infeasible, write_results
-from experiments.run import Run, go_on
+from experiments.run import Run, go_on, read_final_state
 from planning.explain import stop_text
 from planning.operations import NoOperation, Operation, operations
 from planning.planner import FixingPlan, plan
@@ -56,12 +55,13 @@ def run_job(job: Job) -> int:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
         return 1
+    start = None if job.start is None else read_final_state(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:
         console.print(f"Watch at {replay.url}", soft_wrap=True)
     run = Run(*running_cell(job.product, job.config, job.seed, replay))
-    if job.start is not None:
-        todo = go_on(run, todo, read_state(job.start))
+    if start is not None:
+        todo = go_on(run, todo, start)
     pictures = Pictures(run.simulation)
     with Progress(console, [operation.name for operation in todo]) as progress:
         run.watchers = (progress, pictures)

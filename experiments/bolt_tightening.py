@@ -7,8 +7,15 @@ The first line runs the whole assembly up to there; the second goes on from a se
 """
 
 import sys
+from collections.abc import Sequence
 
 from experiments.single import run_operation
 
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the script; return the exit code."""
+    return run_operation("bolt_tightening", "tighten_bolts", __doc__, arguments)
+
+
 if __name__ == "__main__":
-    sys.exit(run_operation("bolt_tightening", __doc__, last="tighten_bolts"))
+    sys.exit(main())

@@ -6,8 +6,15 @@ The planner says which part that is and which side is up.
 """
 
 import sys
+from collections.abc import Sequence
 
 from experiments.single import run_operation
 
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the script; return the exit code."""
+    return run_operation("pick_place", "pick_place", __doc__, arguments)
+
+
 if __name__ == "__main__":
-    sys.exit(run_operation("pick_place", __doc__))
+    sys.exit(main())

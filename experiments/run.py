@@ -5,14 +5,16 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Protocol, cast
+from zipfile import BadZipFile
 
 import numpy as np
 
 from cell.errors import CellError
 from cell.phase import Outcome, Phase, PhaseFailed
 from cell.simulation import Simulation
-from cell.state import State, restore_state, save_state
+from cell.state import State, read_state, restore_state, save_state
 from experiments.criteria import FailedCheck, failed_checks
 from experiments.metrics import measure
 from experiments.record import OperationRecord, PhaseRecord
@@ -176,7 +178,7 @@ def go_on(run: Run, operations: Sequence[Operation], state: State) -> list[Opera
         operations: All operations of the plan.
         state: As `final_state` returned it.
     """
-    done = [str(name) for name in state.get(DONE, ())]
+    done = [str(name) for name in state[DONE]]
     if done != [operation.name for operation in operations[: len(done)]]:
         raise CellError(
             f"The saved state is after {', '.join(done) or 'no operation'}; "
@@ -188,6 +190,17 @@ def go_on(run: Run, operations: Sequence[Operation], state: State) -> list[Opera
         if operation.kind in ("pick_place", "insert_shaft"):
             run.station.fixed += operation.parts
     return list(operations[len(done) :])
+
+
+def read_final_state(path: Path) -> State:
+    """Read what `final_state` returned, from a file."""
+    try:
+        state = read_state(path)
+    except (OSError, ValueError, BadZipFile) as error:
+        raise CellError(f"Cannot read the saved state '{path}': {error}.") from error
+    if DONE not in state:
+        raise CellError(f"'{path}' is not the state.npz that a run ends with.")
+    return state
 
 
 def final_state(run: Run) -> State:

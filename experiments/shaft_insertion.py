@@ -7,8 +7,15 @@ The first line places the part on the jig before; the second goes on from where 
 """
 
 import sys
+from collections.abc import Sequence
 
 from experiments.single import run_operation
 
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the script; return the exit code."""
+    return run_operation("shaft_insertion", "insert_shaft", __doc__, arguments)
+
+
 if __name__ == "__main__":
-    sys.exit(run_operation("shaft_insertion", __doc__, last="insert_shaft"))
+    sys.exit(main())

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import contextlib
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -28,29 +30,35 @@ class Options:
     """Go on from the state.npz of an earlier run with the same product, order and seed."""
 
 
-def run_operation(kind: str, description: str | None, last: str | None = None) -> int:
+def run_operation(
+    command: str, last: str, description: str | None, arguments: Sequence[str] | None = None
+) -> int:
     """Run the plan of a product up to an operation; return the exit code.
 
     Args:
-        kind: Name of the script, recorded as the command.
+        command: Name of the script, for the record.
+        last: Kind of the last operation to run.
         description: For ``--help``.
-        last: Kind of the last operation to run; None: ``kind`` itself.
+        arguments: Command line; None: that of the process.
     """
     try:
-        options = tyro.cli(Options, description=description, config=(FlagCreatePairsOff,))
-        return run_job(job(options, kind, last or kind))
+        options = tyro.cli(
+            Options, args=arguments, description=description, config=(FlagCreatePairsOff,)
+        )
+        return _run(options, command, last)
     except CellError as error:
-        print(f"{kind}: {error}", file=sys.stderr)
+        print(f"{command}: {error}", file=sys.stderr)
         return 2
 
 
-def job(options: Options, command: str, last: str) -> Job:
-    """Return what the options ask for."""
-    wanted = options.assemble
-    common = wanted.common
+def _run(options: Options, command: str, last: str) -> int:
+    wanted, common = options.assemble, options.assemble.common
     config = common.load_config()
-    with output_folder(common.out) as out:
-        return Job(
+    with contextlib.ExitStack() as folders:
+        out = folders.enter_context(output_folder(common.out))
+        if wanted.replay is not None:
+            folders.enter_context(output_folder(wanted.replay.absolute().parent))
+        job = Job(
             product=load_product(wanted.product),
             order=split_order(wanted.order),
             config=config,
@@ -63,3 +71,4 @@ def job(options: Options, command: str, last: str) -> Job:
             last=last,
             start=options.start,
         )
+        return run_job(job)

@@ -1,0 +1,50 @@
+"""The scripts of single operations: their command line and how far they run."""
+
+import json
+from pathlib import Path
+from types import ModuleType
+
+import pytest
+
+from experiments import bolt_tightening, pick_place, shaft_insertion, single
+from experiments.job import Job
+
+SCRIPTS = {
+    "pick_place": (pick_place, "pick_place"),
+    "shaft_insertion": (shaft_insertion, "insert_shaft"),
+    "bolt_tightening": (bolt_tightening, "tighten_bolts"),
+}
+
+
+@pytest.mark.parametrize("name", SCRIPTS)
+def test_script_runs_up_to_its_operation(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs: list[Job] = []
+    monkeypatch.setattr(single, "run_job", lambda job: jobs.append(job) or 0)
+    script, last = SCRIPTS[name]
+    options = ["--seed", "4", "--start", "x.npz", "--quiet", "--out", str(tmp_path / "out")]
+    assert script.main([*options, "--set", "placement.press_force=15"]) == 0
+    (job,) = jobs
+    assert (job.command, job.last, job.seed, job.start) == (name, last, 4, Path("x.npz"))
+    assert job.config.placement.press_force == 15.0
+    assert job.product.name == "motor_unit"
+
+
+@pytest.mark.parametrize("script", [script for script, _ in SCRIPTS.values()])
+def test_infeasible_order_is_a_failure(script: ModuleType, tmp_path: Path) -> None:
+    options = ["--order", "motor,bolts,plate", "--quiet", "--out", str(tmp_path)]
+    assert script.main(options) == 1
+    assert json.loads((tmp_path / "result.json").read_text())["verdict"] == "failure"
+
+
+@pytest.mark.parametrize("content", [None, "no archive"])
+def test_start_that_cannot_be_read_is_bad_input(
+    content: str | None, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    start = tmp_path / "state.npz"
+    if content is not None:
+        start.write_text(content)
+    assert pick_place.main(["--start", str(start), "--out", str(tmp_path / "out")]) == 2
+    assert f"Cannot read the saved state '{start}'" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
