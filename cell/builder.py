@@ -74,7 +74,7 @@ class Cell:
 
     @property
     def X_WJ(self) -> RigidTransform:
-        """Pose of the jig frame while the base is bolted to the force plate."""
+        """Pose of the jig frame where the base was set down."""
         return self.config.workcell.X_WJ
 
     def reset(self, root: Context) -> None:
@@ -166,26 +166,28 @@ def add_workcell(
     """Add table, riser, force plate, jig base and tray.
 
     Returns:
-        The weld between force plate and jig base (where the force plate reads), and the jig base.
+        The weld under the force plate, where it reads, and the jig base.
     """
     X_WJ = config.workcell.X_WJ
     _add_static(plant, "table", RigidTransform())
     _add_static(plant, "riser", X_WJ)
-    force_plate = _add_static(plant, "force_plate", X_WJ)
+    weld = _add_static(plant, "force_plate", X_WJ)
     (instance,) = new_parser(plant).AddModelsFromUrl(model_url("jig_base"))
     jig_base = plant.GetBodyByName("jig_base", instance)
-    weld = plant.WeldFrames(force_plate.body_frame(), jig_base.body_frame())
+    if config.workcell.jig_base_fixed:
+        plant.WeldFrames(weld.frame_on_child(), jig_base.body_frame())
+    else:
+        plant.SetDefaultFloatingBaseBodyPose(jig_base, X_WJ)
     if product.tray is not None:
         _add_static(plant, product.tray, config.workcell.X_WT)
     return weld, jig_base
 
 
-def _add_static(plant: MultibodyPlant, model: str, X_WM: RigidTransform) -> RigidBody:
+def _add_static(plant: MultibodyPlant, model: str, X_WM: RigidTransform) -> WeldJoint:
     """Add a one-body model, welded: contact with ``world_body()`` itself crashes some plants."""
     (instance,) = new_parser(plant).AddModelsFromUrl(model_url(model))
     body = plant.get_body(plant.GetBodyIndices(instance)[0])
-    plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WM)
-    return body
+    return plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WM)
 
 
 def add_threads(

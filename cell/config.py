@@ -88,14 +88,6 @@ class WorkcellConfig:
 
 
 @dataclass(frozen=True)
-class GripperConfig:
-    """The parallel-jaw gripper."""
-
-    max_force: float = setting(130.0, "N", "Largest grip force [R].", above=0.0, at_most=130.0)
-    speed: float = setting(0.15, "m/s", "Rate of the opening [R].", above=0.0, at_most=0.15)
-
-
-@dataclass(frozen=True)
 class DriverConfig:
     """The electric screwdriver."""
 
@@ -197,7 +189,6 @@ class CellConfig:
         p_WB=(0.45, 0.0, 0.0), home_deg=(60.0, -110.0, 110.0, -90.0, -90.0, 0.0)
     )
     workcell: WorkcellConfig = WorkcellConfig()
-    gripper: GripperConfig = GripperConfig()
     driver: DriverConfig = DriverConfig()
     jig: JigParameters = JigParameters()
     placement: PlacementConfig = PlacementConfig()

@@ -17,8 +17,8 @@ from cell.parts import Parts
 class WrenchSensor:
     """A six-axis force-torque sensor built into a weld.
 
-    The reading is the wrench that the body beyond the weld (the tool, the jig) exerts on the
-    sensor, expressed in W, about the weld's origin, with the reading at rest taken off by `tare`.
+    The reading is the wrench that the body beyond the weld (the tool, the force plate with all it
+    carries) exerts on the sensor, expressed in W, about the weld's origin; weights are in it.
     """
 
     plant: MultibodyPlant

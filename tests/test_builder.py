@@ -113,3 +113,19 @@ def test_two_cells_from_one_configuration_are_alike() -> None:
     assert one.GetStateNames() == other.GetStateNames()
     q_one, q_other = (plant.GetPositions(plant.CreateDefaultContext()) for plant in (one, other))
     np.testing.assert_array_equal(q_one, q_other)
+
+
+@pytest.mark.parametrize("fixed", ["true", "false"])
+def test_jig_base_rests_on_the_force_plate_bolted_or_free(fixed: str) -> None:
+    """A base that is not bolted down stays where it is by its weight; the plate reads it."""
+    config = CellConfig.load(overrides=[f"workcell.jig_base_fixed={fixed}"])
+    cell = build_cell(config, load_product("motor_unit"))
+    simulation = Simulation(cell)
+    for _ in range(200):
+        simulation.step()
+    X_WJ = cell.soft_jig.pose(simulation.context)
+    assert np.linalg.norm(X_WJ.translation() - cell.X_WJ.translation()) < 0.1e-3
+    bodies = [cell.plant.GetBodyByName(name) for name in ("force_plate", "jig_base")]
+    weight = 9.81 * sum(body.default_mass() for body in bodies)
+    wrench = cell.force_plate.read(simulation.context)
+    np.testing.assert_allclose(wrench[3:], [0.0, 0.0, -weight], atol=0.01 * weight)
