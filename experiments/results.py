@@ -11,7 +11,8 @@ import numpy as np
 
 from cell.state import State
 from experiments.job import Job
-from experiments.metrics import INSERTION_PHASES, insertion_curve, thread_curve
+from experiments.metrics.bolts import thread_curve
+from experiments.metrics.insert import INSERTION_PHASES, insertion_curve
 from experiments.output import write_arrays, write_json
 from experiments.pictures import Pictures
 from experiments.plots import plot_force_plate, plot_insertion_force, plot_torque

@@ -16,7 +16,7 @@ from cell.phase import Outcome, Phase, PhaseFailed
 from cell.simulation import Simulation
 from cell.state import State, read_state, restore_state, save_state
 from experiments.criteria import FailedCheck, failed_checks
-from experiments.metrics import measure
+from experiments.metrics.measure import measure
 from experiments.record import OperationRecord, PhaseRecord
 from experiments.snapshot import take_snapshot
 from planning.operations import Operation, phases

@@ -8,17 +8,10 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.loading import load_product
 from experiments.criteria import LIMITS, failed_checks
-from experiments.metrics import (
-    advance,
-    clamp_target,
-    force_plate_peaks,
-    moved,
-    placement_errors,
-    seat_errors,
-    standing,
-    torque_shares,
-    trip,
-)
+from experiments.metrics.bolts import advance, clamp_target, standing, torque_shares, trip
+from experiments.metrics.common import force_plate_peaks, moved
+from experiments.metrics.insert import seat_errors
+from experiments.metrics.place import placement_errors
 from experiments.record import PhaseRecord, rows_between
 from experiments.snapshot import Snapshot, Wrench
 from planning.operations import Operation
