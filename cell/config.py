@@ -92,7 +92,7 @@ class DriverConfig:
     """The electric screwdriver."""
 
     free_speed: float = setting(
-        50.0, "rad/s", "Spindle while the bolt runs down: 480 rpm [A].", above=0.0
+        80.0, "rad/s", "Spindle while the bolt runs down: 760 rpm [A].", above=0.0
     )
     seat_speed: float = setting(
         10.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0

@@ -178,9 +178,10 @@ def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
     return order
 
 
-BIT_HOVER = 0.02  # The bit waits this far above the socket [m] [A].
+BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
+PLUNGE_SPEED = 0.04  # Of the bit down to the socket [m/s] [A].
 FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
-SLOW_BELOW = 6e-4  # Height of the head above its seat from where the spindle turns slowly [m] [A].
+SLOW_BELOW = 2.5e-4  # Height of the head above its seat from where the spindle turns slowly [m] [A].
 FEED_DEPTH = 0.008  # The feed can follow the bolt this far [m]: engaged length and reserve.
 FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
 FEED_LIMIT = 0.02  # [m/s] [A]
@@ -237,7 +238,7 @@ def tighten_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         f"{bolt}: bit into socket",
         lambda sensed: sensed.finished and thread.bit_position is not None,
         timeout=5.0,
-        right=station.line("right", tip, X_WE, speed=SLOW),
+        right=station.line("right", tip, X_WE, speed=PLUNGE_SPEED),
         spindle=FIND_SPEED,
         every_step=lambda simulation: _engage(simulation, thread),
         awake=awake,
