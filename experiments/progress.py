@@ -11,9 +11,6 @@ from rich.table import Table
 
 from experiments.run import StepResult
 
-# Quantities worth a line on the terminal; the report has all of them. Name -> unit, factor, digits.
-SHOWN = {"m": ("mm", 1e3), "rad": ("deg", 57.2957795), "m_per_s": ("mm/s", 1e3)}
-
 
 class Progress:
     """A bar with the present phase, if the output is a terminal; else one line per step."""
