@@ -28,21 +28,17 @@ from cell.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 BASE = (260.0, 200.0, 8.0)
 PRINTED = 1240.0  # kg/m3, PLA [A].
 
-# The motor lies with its shaft along +y_T and its own +x down, so that the contact polygons of
-# gearbox (15 corners) and can (24 flats) are mirror images about the vertical.
-MOTOR_AXIS_X, MOTOR_FACE_Y, MOTOR_AXIS_Z = -70.0, 58.0, 32.0
-GEARBOX_CORNERS = 15  # [R] Drake's polygon for radius 18.4 mm at a hint of 8 mm.
+# The motor lies with its shaft along +y_T and its own +x down: gearbox and can, prisms of 16 flats
+# in contact, have a flat towards each slab of the cradles.
+MOTOR_AXIS_X, MOTOR_AXIS_Z = -70.0, 32.0
 
 # The plate lies foot down with x_A along x_T.
 PLATE_X, PLATE_Y, PLATE_Z = 70.0, 40.0, 30.0
 
 # Bolts hang by their heads between two rails, 16 mm apart.
 BOLT_Y, BOLT_Z, BOLT_SPACING, RAIL_GAP = -70.0, 24.0, 16.0, 3.7
-RAIL_WIDTH, RIDGE_WIDTH, RIDGE_HEIGHT = (
-    6.0,
-    0.6,
-    4.0,
-)  # Ends inside of the head's rim, even off centre by 0.3.
+# A ridge ends inside of the head's rim, even off centre by 0.3.
+RAIL_WIDTH, RIDGE_WIDTH, RIDGE_HEIGHT = 6.0, 0.6, 4.0
 
 PLASTIC = Contact(0.5, 1e8, dissipation=5.0)  # [A] printed polymer, stiff against part weights.
 # Pressure rises over half the width of a piece: a thin one needs a lower modulus to be as stiff.
@@ -52,8 +48,10 @@ BASE_GREY, NEST_TEAL = (0.22, 0.24, 0.27), (0.10, 0.48, 0.50)
 
 def motor_nest() -> list[Piece]:
     """Return two V cradles and two end stops."""
-    gearbox = GEARBOX_RADIUS * np.cos(np.deg2rad(3.0))  # 45 degrees is 3 degrees off a corner.
-    can = vertex_radius(CAN_RADIUS, CAN_FACETS) * np.cos(np.pi / CAN_FACETS)
+    gearbox, can = (
+        vertex_radius(radius, CAN_FACETS) * np.cos(np.pi / CAN_FACETS)
+        for radius in (GEARBOX_RADIUS, CAN_RADIUS)
+    )
     front = _cradle("motor_front", gearbox, y_low=38.0, y_high=54.0)
     rear = _cradle("motor_rear", can, y_low=5.5, y_high=11.5)
     x = MOTOR_AXIS_X
