@@ -58,3 +58,9 @@ def decoded(file: Path) -> list[bytes]:
     """Return Meshcat's commands in a static page."""
     found = re.findall(r"base64,([A-Za-z0-9+/=]{100,})", file.read_text())
     return [base64.b64decode(text) for text in found]
+
+
+def test_view_has_an_address() -> None:
+    url = Replay(view=True, file=None).url
+    assert url is not None
+    assert url.startswith("http://")
