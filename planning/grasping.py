@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -79,7 +79,7 @@ def reachable_grasps(
                 yield Reach(grasp, q_before, at[0], X_WJaw)
 
 
-def lost_grasp(held_opening: float):
+def lost_grasp(held_opening: float) -> Callable[[Sensed], str | None]:
     """Return a guard: the jaws have closed further than when they gripped."""
 
     def guard(sensed: Sensed) -> str | None:
@@ -132,7 +132,9 @@ def take(station: Station, part: str, reach: Reach, lift: float) -> Iterator[Pha
     )
 
 
-def grip(station: Station, part: str, grasp: Grasp, awake: frozenset[str] = frozenset()):
+def grip(
+    station: Station, part: str, grasp: Grasp, awake: frozenset[str] = frozenset()
+) -> Generator[Phase, Outcome, None]:
     """Yield the phase that closes the jaws; fails if they find nothing in between."""
     outcome: Outcome = yield Phase(
         f"{part}: grip",

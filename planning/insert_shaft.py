@@ -2,7 +2,7 @@
 
 The hand carries the part over the shaft, then goes soft: an impedance centred on the hole lets it
 comply sideways and tilt, pushes with a limited force, and searches on a spiral if the shaft has not
-found the hole. Seated means that gap and tilt are both small, and is measured, not assumed.
+found the hole. It ends when the part stands still; whether it is seated is measured, not assumed.
 """
 
 from __future__ import annotations
@@ -12,12 +12,14 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform
+from pydrake.multibody.tree import Frame
 
 from cell.config import InsertionConfig
-from cell.phase import Impedance, Outcome, Phase, Sensed, motion_finished
+from cell.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
 from cell.product import Fit
 from planning.grasping import (
     HAND_SPEED,
+    Reach,
     first,
     let_go,
     lost_grasp,
@@ -33,12 +35,12 @@ BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand
 RETREAT = 0.08
 STALL_SPEED = 5e-4  # Slower than this is standing [m/s].
 STALL_TIME = 0.25
-SEATED_GAP = 2e-4  # Largest gap that counts as seated [m].
-SEATED_TILT = np.deg2rad(1.0)
 YAW_STIFFNESS = 40.0  # About the axis of the hole; the bolt holes must meet [N m/rad] [A].
 LATERAL_LIMIT = 15.0  # [N] [A]
 TORQUE_LIMIT = 1.0  # [N m] [A]
 TOO_MUCH = 30.0  # Insertion fails above this force [N].
+
+Target = Callable[[float], RigidTransform]  # X_WD of the compliance centre over time [s].
 
 
 @dataclass
@@ -109,7 +111,7 @@ def raised(X_WP: RigidTransform, height: float) -> RigidTransform:
     return RigidTransform(X_WP.rotation(), X_WP.translation() + [0.0, 0.0, height])
 
 
-def _useful(station: Station, fit: Fit, X_WGoal: RigidTransform):
+def _useful(station: Station, fit: Fit, X_WGoal: RigidTransform) -> Iterator[Reach]:
     """Yield grasps of the part in the tray with which the hand also fits over the shaft."""
     part = station.part(fit.hole)
     for reach in reachable_grasps(station, part.name, station.sense(part.name), part.grasps):
@@ -131,7 +133,7 @@ def _insert(
     station: Station,
     fit: Fit,
     X_WGoal: RigidTransform,
-    jaw,
+    jaw: Frame,
     X_JawP: RigidTransform,
     awake: frozenset[str],
 ) -> Iterator[Phase]:
@@ -142,7 +144,7 @@ def _insert(
     X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
     holding = lost_grasp(station.held_opening)
 
-    def soft(name: str, force: float, target, until, timeout: float) -> Phase:
+    def soft(name: str, force: float, target: Target, until: Condition, timeout: float) -> Phase:
         return Phase(
             f"{fit.hole}: {name}",
             until,
@@ -165,9 +167,12 @@ def _insert(
     if gap(outcome) > fit.depth / 2:
         mouth = gap(outcome)
         search = spiral(X_WSeat, mouth - BEYOND, config)
-        found = lambda sensed: height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3  # noqa: E731
-        turns = config.search_radius**2 * np.pi / config.search_pitch
-        yield soft("search", config.search_force, search, found, turns / config.search_speed)
+
+        def found(sensed: Sensed) -> bool:
+            return height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3
+
+        length = config.search_radius**2 * np.pi / config.search_pitch
+        yield soft("search", config.search_force, search, found, length / config.search_speed)
         down = sinking(X_WSeat, mouth - 1e-3, -BEYOND, config.speed)
         outcome = yield soft("insert again", config.force_limit, down, Stalled(height), 6.0)
 
@@ -179,7 +184,7 @@ def too_much_force(sensed: Sensed) -> str | None:
 
 
 def impedance(
-    config: InsertionConfig, jaw, X_JawC: RigidTransform, target, force: float
+    config: InsertionConfig, jaw: Frame, X_JawC: RigidTransform, target: Target, force: float
 ) -> Impedance:
     """Return the impedance about the hole, with a limited downward force."""
     turn, side = config.rotational_stiffness, config.lateral_stiffness
@@ -192,16 +197,12 @@ def impedance(
     )
 
 
-def sinking(
-    X_WSeat: RigidTransform, start: float, end: float, speed: float
-) -> Callable[[float], RigidTransform]:
+def sinking(X_WSeat: RigidTransform, start: float, end: float, speed: float) -> Target:
     """Return a target that sinks from ``start`` to ``end`` above the seat [m]."""
     return lambda t: raised(X_WSeat, max(start - speed * t, end))
 
 
-def spiral(
-    X_WSeat: RigidTransform, height: float, config: InsertionConfig
-) -> Callable[[float], RigidTransform]:
+def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:
     """Return a target on an Archimedean spiral of constant speed about the axis of the hole.
 
     With pitch p the arc length is s = p angle^2 / (4 pi), so the angle is sqrt(4 pi s / p).

@@ -18,6 +18,7 @@ from cell.config import CellConfig
 from cell.parts import add_parts
 from cell.product import Part, Product
 from planning.collision_model import CollisionModel, Surroundings
+from planning.joint_path import JointPath
 from planning.kinematics import ik_solutions, tool_pose
 from planning.motion import plan_line, plan_path
 from planning.timing import JointMotion, time_path
@@ -185,7 +186,7 @@ class Station:
         distance = float(np.linalg.norm(X_WGoal.translation() - start.translation()))
         return slowed(self._timed(arm, path), distance / speed)
 
-    def _timed(self, arm: str, path) -> JointMotion:
+    def _timed(self, arm: str, path: JointPath) -> JointMotion:
         motion = self.config.motion
         return time_path(
             self.arm(arm),
