@@ -8,14 +8,15 @@ until the clutch trips.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 
-from cell.phase import Follow, Phase, Sensed, after, motion_finished
+from cell.phase import Follow, Outcome, Phase, Sensed, after, motion_finished
+from cell.product import Grasp
 from cell.simulation import Simulation
 from cell.thread import BIT_SEAT, Thread, ThreadState
 from planning.grasping import (
@@ -26,11 +27,13 @@ from planning.grasping import (
     grip,
     let_go,
     lost_grasp,
+    no_grasp,
     opened,
     reachable_grasps,
     take,
 )
 from planning.insert_shaft import raised
+from planning.kinematics import Unreachable
 from planning.station import Station
 from planning.timing import JointMotion
 
@@ -51,7 +54,7 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         bolt: Name of a fastener of the product.
     """
     yield Phase(f"{bolt}: look", after(0.05), 1.0, awake=frozenset([bolt]))
-    reach, _ = _grasp_for_hole(station, bolt)
+    reach = _grasp_for_hole(station, bolt)
     yield from take(station, bolt, reach, LIFT)
     jaw = station.arm("left").frame(reach.grasp.jaw)
     X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(bolt)
@@ -59,7 +62,7 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     holding, held = lost_grasp(station.held_opening), frozenset([bolt])
     above = raised(X_WStand, ABOVE) @ X_JawP.inverse()
     may_touch = [("held", "*")]
-    (q_above, *_) = station.configurations(
+    q_above = station.configuration(
         "left", jaw, above, reach.q_before, may_touch, clearance=FINE_CLEARANCE
     )
     yield Phase(
@@ -106,7 +109,7 @@ def _assembled(station: Station, bolt: str) -> frozenset[str]:
     return frozenset([fastener.into, fastener.clamps])
 
 
-def _grasp_for_hole(station: Station, bolt: str) -> tuple[Reach, np.ndarray]:
+def _grasp_for_hole(station: Station, bolt: str) -> Reach:
     """Return a grasp with which the hand also fits between the neighbours of the hole."""
     X_WStand = standing_pose(station, bolt)
     part = station.part(bolt)
@@ -118,12 +121,12 @@ def _grasp_for_hole(station: Station, bolt: str) -> tuple[Reach, np.ndarray]:
             "left", jaw, X_WJaw, reach.q_before, may_touch, clearance=FINE_CLEARANCE
         )
         if fits and np.max(np.abs(fits[0] - reach.q_before)) < np.pi:
-            return reach, fits[0]
-    return first(iter(()), bolt, station), np.zeros(6)
+            return reach
+    raise no_grasp(station, bolt)
 
 
-def hold(station: Station, part: str) -> Iterator[Phase]:
-    """Yield the phases with which the left hand grips an assembled part where it is."""
+def hold(station: Station, part: str) -> Generator[Phase, Outcome, Grasp]:
+    """Yield the phases with which the left hand grips an assembled part; return the grasp."""
     reach = first(_from_the_side(station, part), part, station)
     frame = station.arm("left").frame(reach.grasp.jaw)
     yield Phase(
@@ -140,6 +143,7 @@ def hold(station: Station, part: str) -> Iterator[Phase]:
         left=station.line("left", frame, reach.X_WJaw, speed=HAND_SPEED),
     )
     yield from grip(station, part, reach.grasp, awake=frozenset(station.fixed))
+    return reach.grasp
 
 
 def _from_the_side(station: Station, part: str) -> Iterator[Reach]:
@@ -153,11 +157,11 @@ def _from_the_side(station: Station, part: str) -> Iterator[Reach]:
     return reachable_grasps(station, part, X_WP, grasps)
 
 
-def release_hold(station: Station, part: str, awake: frozenset[str]) -> Iterator[Phase]:
+def release_hold(
+    station: Station, part: str, grasp: Grasp, awake: frozenset[str]
+) -> Iterator[Phase]:
     """Yield the phases that let go of a part held by `hold`."""
-    (grasp, *_) = [r.grasp for r in _from_the_side(station, part)] or [None]
-    if grasp is not None:
-        yield from let_go(station, part, grasp, RETREAT, awake)
+    yield from let_go(station, part, grasp, RETREAT, awake)
 
 
 def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
@@ -181,7 +185,7 @@ def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.04  # Of the bit down to the socket [m/s] [A].
 FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
-SLOW_BELOW = 2.5e-4  # Height of the head above its seat from where the spindle turns slowly [m] [A].
+SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
 FEED_DEPTH = 0.008  # The feed can follow the bolt this far [m]: engaged length and reserve.
 FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
 FEED_LIMIT = 0.02  # [m/s] [A]
@@ -223,7 +227,7 @@ def tighten_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     near = station.arm("right").positions(station.context)
     above = backed_off(X_WE, BIT_HOVER)
     holding = [("left_tool", part) for part in station.fixed]
-    (q_above, *_) = _configurations_about(station, tip, above, near, holding)
+    q_above = _driver_configuration(station, tip, above, near, holding)
     yield Phase(
         f"{bolt}: driver above",
         motion_finished,
@@ -306,16 +310,18 @@ def _socket_pose(station: Station, bolt: str) -> RigidTransform:
     return RigidTransform(RotationMatrix.MakeXRotation(np.pi), p_WE)
 
 
-def _configurations_about(
+def _driver_configuration(
     station: Station,
     tip: Frame,
     X_WE: RigidTransform,
     near: np.ndarray,
     may_touch: list[tuple[str, str]],
-) -> list[np.ndarray]:
-    """Return configurations with the driver turned any way about its own axis, nearest first."""
+) -> np.ndarray:
+    """Return the nearest configuration with the driver turned any way about its own axis."""
     found = []
     for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
         X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
         found += station.configurations("right", tip, X, near, may_touch, clearance=FINE_CLEARANCE)
-    return sorted(found, key=lambda q: float(np.max(np.abs(q - near))))
+    if not found:
+        raise Unreachable("right", tip.name(), X_WE, "no turn of the driver keeps clear there")
+    return min(found, key=lambda q: float(np.max(np.abs(q - near))))

@@ -75,7 +75,7 @@ def insert_shaft(station: Station, fit: Fit) -> Iterator[Phase]:
     X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
     holding = lost_grasp(station.held_opening)
     above = raised(X_WGoal, ABOVE) @ X_JawP.inverse()
-    (q_above, *_) = station.configurations("left", jaw, above, reach.q_before, [("held", "*")])
+    q_above = station.configuration("left", jaw, above, reach.q_before, [("held", "*")])
     yield Phase(
         f"{part}: transfer",
         motion_finished,

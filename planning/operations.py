@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 from cell.errors import CellError
-from cell.phase import Phase
+from cell.phase import Outcome, Phase
 from cell.product import Fit, Product
 from planning.fasten import hold, place_bolt, release_hold, star_order, tighten_bolt
 from planning.insert_shaft import insert_shaft
@@ -99,13 +99,13 @@ def _place_bolts(station: Station, operation: Operation) -> Iterator[Phase]:
         yield from place_bolt(station, bolt)
 
 
-def _tighten_bolts(station: Station, operation: Operation) -> Iterator[Phase]:
+def _tighten_bolts(station: Station, operation: Operation) -> Generator[Phase, Outcome, None]:
     fasteners = station.cell.product.fasteners
     clamped = fasteners[operation.parts[0]].clamps
-    yield from hold(station, clamped)
+    grasp = yield from hold(station, clamped)
     for bolt in star_order(station, operation.parts):
         yield from tighten_bolt(station, bolt)
-    yield from release_hold(station, clamped, frozenset([*station.fixed, *operation.parts]))
+    yield from release_hold(station, clamped, grasp, frozenset([*station.fixed, *operation.parts]))
 
 
 _PHASES = {

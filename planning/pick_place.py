@@ -49,12 +49,12 @@ def pick_place(
     # The pose in the hand is measured, not assumed: the part may have slipped in the grip.
     X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
     X_WJaw = placement.X_WP @ X_JawP.inverse()
-    q_hover = station.configurations("left", frame, X_WJaw, placement.q, [("held", "jig_base")])
+    q_hover = station.configuration("left", frame, X_WJaw, placement.q, [("held", "jig_base")])
     yield Phase(
         f"{part}: transfer",
         motion_finished,
         timeout=20.0,
-        left=station.move("left", q_hover[0], [("held", "jig_base")]),
+        left=station.move("left", q_hover, [("held", "jig_base")]),
         guard=holding,
         awake=awake,
     )

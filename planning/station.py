@@ -19,7 +19,7 @@ from cell.parts import add_parts
 from cell.product import Part, Product
 from planning.collision_model import CollisionModel, Surroundings
 from planning.joint_path import JointPath
-from planning.kinematics import ik_solutions, tool_pose
+from planning.kinematics import Unreachable, ik_solutions, tool_pose
 from planning.motion import plan_line, plan_path
 from planning.timing import JointMotion, time_path
 
@@ -137,6 +137,24 @@ class Station:
         self.model.arrange(self.surroundings(may_touch, clearance))
         solutions = ik_solutions(self.arm(arm), self.context, frame, X_WF, near)
         return [q for q in solutions if is_regular(q) and self.model.is_free(arm, q)]
+
+    def configuration(
+        self,
+        arm: str,
+        frame: Frame,
+        X_WF: RigidTransform,
+        near: np.ndarray,
+        may_touch: Iterable[tuple[str, str]] = (),
+        clearance: float | None = None,
+    ) -> np.ndarray:
+        """Return the nearest of the `configurations` (6,).
+
+        Raises:
+            Unreachable: There is none.
+        """
+        for q in self.configurations(arm, frame, X_WF, near, may_touch, clearance):
+            return q
+        raise Unreachable(arm, frame.name(), X_WF, "out of reach, or every way there collides")
 
     def move(
         self,
