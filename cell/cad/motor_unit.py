@@ -87,8 +87,8 @@ ANODISED, BLACK_OXIDE, DARK = (0.62, 0.70, 0.80), (0.16, 0.16, 0.18), (0.28, 0.2
 BOSS_FACETS = 32  # Mean radius is kept; corners and flats differ by 14 um of 75 um clearance.
 WASHER_FACETS = 8
 # The gearbox is felt twice: its face, compliant, by the plate; its side, rigid, by bed and jaws.
-# Under a bolt the face yields like the clamped aluminium, 3.5e8 N/m [D]: a modulus of 1e10 over half
-# of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m.
+# Under a bolt the face yields like the clamped aluminium, 3.5e8 N/m [D]: a modulus of 1e10 over
+# half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m.
 SEAT_FACETS, SEAT_DEPTH, SEAT_GAP = 8, 1.5, 0.2
 HEAD_FACETS = 8
 
