@@ -58,6 +58,7 @@ LIMITS = (
     Limit("tighten_bolts", "torque_deviation", 0.10, "what clutch drivers repeat", each=True),
     Limit("tighten_bolts", "advance_deviation", 0.02, "the bolt follows its helix", each=True),
     Limit("tighten_bolts", "clamp_deviation", 0.15, "against T / (K d); K scatters so", each=True),
+    Limit("tighten_bolts", "clamp_deviation_at_end", 0.15, "later bolts relax earlier ones", True),
     Limit("tighten_bolts", "base_moved_since_placed_m", 1e-3, STILL),
     Limit("tighten_bolts", "base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
 )

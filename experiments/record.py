@@ -23,11 +23,13 @@ class PhaseRecord:
     Attributes:
         start, end: The truth before its first and after its last step.
         peak_force: Largest force at each wrist, less the reading at the start [N].
+        awake: Names of the parts that were: nothing acts on a part that sleeps.
     """
 
     start: Snapshot
     end: Snapshot
     peak_force: Mapping[str, float]
+    awake: frozenset[str] = frozenset()
 
 
 @dataclass
@@ -53,6 +55,11 @@ class OperationRecord:
         """Return those of the phases "<part>: <name>" that ran, in the order of the names."""
         keys = [f"{part}: {name}" for name in names]
         return [self.phases[key] for key in keys if key in self.phases]
+
+    def last_awake(self, part: str) -> Snapshot | None:
+        """Return the truth at the end of the latest phase in which a part was awake."""
+        ends = [phase.end for phase in self.phases.values() if part in phase.awake]
+        return max(ends, key=lambda end: end.time, default=None)
 
 
 def rows_between(log: Arrays, start: float, end: float) -> dict[str, np.ndarray]:

@@ -17,7 +17,7 @@ from experiments.output import write_arrays, write_json
 from experiments.pictures import Pictures
 from experiments.plots import plot_force_plate, plot_insertion_force, plot_torque
 from experiments.prepare import Disturbance
-from experiments.record import Arrays, rows_of
+from experiments.record import Arrays, OperationRecord, rows_of
 from experiments.report import Picture, write_report
 from experiments.run import Run, StepResult, final_state
 from planning.plan_file import plan_to_dict
@@ -26,6 +26,7 @@ from planning.planner import FixingPlan
 PACKAGES = ("soft-jig-cell", "drake", "numpy", "scipy", "ompl", "trimesh")
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 
+LAST = np.pi / 4  # The tightening takes place within this angle before the trip [rad].
 ASLEEP = "A part that rests while nothing touches it sleeps: the force plate does not feel it then."
 
 
@@ -152,23 +153,27 @@ def _plots(run: Run, log: Arrays) -> list[Picture]:
             limit = run.station.config.insertion.force_limit
             plots.append((record.operation.name, plot_insertion_force(depth, force, limit)))
         if record.operation.kind == "tighten_bolts":
-            plots += _torque_plot(run, log)
+            plots += _torque_plots(run, record, log)
     return plots
 
 
-def _torque_plot(run: Run, log: Arrays) -> list[Picture]:
-    record = run.records[-1]
+def _torque_plots(run: Run, record: OperationRecord, log: Arrays) -> list[Picture]:
+    """Return torque over angle from the catch of the thread, and the end of it, from the trip."""
     angles: dict[str, np.ndarray] = {}
     torques: dict[str, np.ndarray] = {}
     for bolt in record.operation.parts:
         phases = record.named(bolt, "run down", "tighten")
         if len(phases) == 2:
             rows = rows_of(log, phases)
-            angle, _, clamp = thread_curve(run.simulation.cell, bolt, rows)
-            angles[bolt] = angle - angle[0]
+            angles[bolt], _, clamp = thread_curve(run.simulation.cell, bolt, rows)
             torques[bolt] = rows["spindle_torque"][-len(clamp) :]
-    return [("Tightening", plot_torque(angles, torques, _torque(run)))] if angles else []
-
-
-def _torque(run: Run) -> float:
-    return run.station.config.driver.clutch_torque
+    if not angles:
+        return []
+    target = run.station.config.driver.clutch_torque
+    whole = {bolt: angle - angle[0] for bolt, angle in angles.items()}
+    last = {bolt: (angle - angle[-1])[angle > angle[-1] - LAST] for bolt, angle in angles.items()}
+    ends = {bolt: torques[bolt][-len(angle) :] for bolt, angle in last.items()}
+    return [
+        ("Tightening, from the thread's catch", plot_torque(whole, torques, target)),
+        ("Tightening, up to the clutch's trip", plot_torque(last, ends, target)),
+    ]

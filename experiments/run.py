@@ -167,7 +167,7 @@ class Run:
             start = take_snapshot(self.simulation)
             outcome = yield phase
             end = take_snapshot(self.simulation)
-            record.phases[phase.name] = PhaseRecord(start, end, outcome.peak_force)
+            record.phases[phase.name] = PhaseRecord(start, end, outcome.peak_force, phase.awake)
 
 
 def go_on(run: Run, operations: Sequence[Operation], state: State) -> list[Operation]:

@@ -12,7 +12,7 @@ from experiments.metrics.bolts import advance, clamp_target, standing, torque_sh
 from experiments.metrics.common import force_plate_peaks, moved
 from experiments.metrics.insert import seat_errors
 from experiments.metrics.place import placement_errors
-from experiments.record import PhaseRecord, rows_between
+from experiments.record import OperationRecord, PhaseRecord, rows_between
 from experiments.snapshot import Snapshot, Wrench
 from planning.operations import Operation
 
@@ -164,3 +164,15 @@ def test_limits_of_bolts_hold_for_each() -> None:
     operation = Operation("tighten bolts", "tighten_bolts", ("bolt_1", "bolt_2"))
     failed = [check.quantity for check in failed_checks(operation, {})]
     assert {"bolt_1/torque_deviation", "bolt_2/torque_deviation"} <= set(failed)
+
+
+def test_what_remains_is_read_while_the_bolt_is_awake() -> None:
+    """A sleeping bolt carries no force in the model: its last waking moment counts."""
+    record = OperationRecord(Operation("tighten bolts", "tighten_bolts", ("bolt_1",)), snapshot())
+    late, asleep = snapshot(time=3.0), snapshot(time=5.0)
+    awake = frozenset(["bolt_1"])
+    record.phases["bolt_1: stop"] = PhaseRecord(snapshot(), snapshot(time=2.0), {}, awake)
+    record.phases["bolt_2: stop"] = PhaseRecord(snapshot(), late, {}, awake)
+    record.phases["plate: retreat"] = PhaseRecord(late, asleep, {})
+    assert record.last_awake("bolt_1") is late
+    assert record.last_awake("plate") is None

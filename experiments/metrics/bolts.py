@@ -45,14 +45,13 @@ def standing(fastener: Fastener, X_HF: RigidTransform) -> Measured:
 
 def measure_tighten(cell: Cell, record: OperationRecord, log: Arrays) -> Measured:
     """Return torque, angle, advance and clamp force of each bolt, and who held against it."""
-    assert record.end is not None
     measured: Measured = {}
     for bolt in record.operation.parts:
         if f"{bolt}: tighten" not in record.phases:
             continue
         fastener = cell.product.fasteners[bolt]
         tighten = record.phases[f"{bolt}: tighten"]
-        at_trip = trip(fastener, tighten.end, record.end)
+        at_trip = trip(fastener, tighten.end, record.last_awake(bolt) or tighten.end)
         at_trip |= torque_shares(fastener, tighten)
         driven = rows_of(log, record.named(bolt, "run down", "tighten"))
         curve = thread_curve(cell, bolt, driven)
@@ -67,7 +66,13 @@ def clamp_target(fastener: Fastener) -> float:
 
 
 def trip(fastener: Fastener, at_trip: Snapshot, at_end: Snapshot) -> Measured:
-    """Return torque and clamp force of a bolt when the clutch trips, and what remains."""
+    """Return torque and clamp force of a bolt when the clutch trips, and what remains of it.
+
+    Args:
+        fastener: Which bolt.
+        at_trip: The truth when the clutch trips.
+        at_end: The truth when all bolts are tight, while the bolt is still awake.
+    """
     bolt, target = fastener.part, clamp_target(fastener)
     return {
         "torque_at_trip_N_m": at_trip.spindle_torque,
@@ -77,6 +82,7 @@ def trip(fastener: Fastener, at_trip: Snapshot, at_end: Snapshot) -> Measured:
         "clamp_at_end_N": at_end.clamp[bolt],
         "clamp_target_N": target,
         "clamp_deviation": at_trip.clamp[bolt] / target - 1.0,
+        "clamp_deviation_at_end": at_end.clamp[bolt] / target - 1.0,
     }
 
 
