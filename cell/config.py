@@ -145,7 +145,11 @@ class InsertionConfig:
     rotational_stiffness: float = setting(
         5.0, "N m/rad", "Stiffer leaves the plate tilted on the motor [M].", above=0.0
     )
-    speed: float = setting(0.008, "m/s", "Of the descent; the seat is stiff: 20 mm/s strike it with 40 N [M].", above=0.0, at_most=0.1)
+    speed: float = setting(0.012, "m/s", "Of the descent [A].", above=0.0, at_most=0.1)
+    landing_speed: float = setting(
+        3e-3, "m/s", "Around the seat, which is stiff: 20 mm/s strike it with 40 N [M].",
+        above=0.0, at_most=0.1,
+    )  # fmt: skip
     search_force: float = setting(3.0, "N", "Downward during the spiral [M].", above=0.0)
     search_pitch: float = setting(
         1.5e-4, "m", "Of the spiral, about twice the radial clearance [M].", above=0.0
