@@ -31,6 +31,7 @@ from planning.station import Station
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].
 NEAR = 0.002  # The hand goes soft this far before shaft and hole can meet [m] [A].
+LANDING = 0.001  # Slow from this far above the seat to this far below it [m] [A].
 BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand presses [m] [A].
 RETREAT = 0.08
 STALL_SPEED = 5e-4  # Slower than this is standing [m/s].
@@ -162,7 +163,7 @@ def _insert(
         return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
 
     start = fit.depth + NEAR
-    down = sinking(X_WSeat, start, -BEYOND, config.speed)
+    down = sinking(X_WSeat, start, config)
     outcome = yield soft("insert", config.force_limit, down, Stalled(height), 6.0)
     if gap(outcome) > fit.depth / 2:
         mouth = gap(outcome)
@@ -173,7 +174,7 @@ def _insert(
 
         length = config.search_radius**2 * np.pi / config.search_pitch
         yield soft("search", config.search_force, search, found, length / config.search_speed)
-        down = sinking(X_WSeat, mouth - 1e-3, -BEYOND, config.speed)
+        down = sinking(X_WSeat, mouth - 1e-3, config)
         outcome = yield soft("insert again", config.force_limit, down, Stalled(height), 6.0)
 
 
@@ -197,9 +198,15 @@ def impedance(
     )
 
 
-def sinking(X_WSeat: RigidTransform, start: float, end: float, speed: float) -> Target:
-    """Return a target that sinks from ``start`` to ``end`` above the seat [m]."""
-    return lambda t: raised(X_WSeat, max(start - speed * t, end))
+def sinking(X_WSeat: RigidTransform, start: float, config: InsertionConfig) -> Target:
+    """Return a target that sinks from ``start`` above the seat [m] to below it.
+
+    It slows down around the seat, which metal meets metal at, and then builds up the force.
+    """
+    heights = [start, LANDING, -LANDING, -BEYOND]
+    speeds = [config.speed, config.landing_speed, config.speed]
+    times = np.cumsum([0.0, *(-np.diff(heights) / speeds)])
+    return lambda t: raised(X_WSeat, float(np.interp(t, times, heights)))
 
 
 def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:

@@ -90,7 +90,7 @@ WASHER_FACETS = 8
 # Under a bolt the face yields like the clamped aluminium, 3.5e8 N/m [D]: a modulus of 1e10 over
 # half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m.
 SEAT_FACETS, SEAT_DEPTH, SEAT_GAP = 8, 1.5, 0.2
-HEAD_FACETS = 8
+HEAD_FACETS = 12  # A flat under each of the jaws, for grasps every 30 degrees.
 
 
 def lumped_head_friction() -> float:
@@ -270,7 +270,7 @@ def bolt_pieces() -> list[Piece]:
     body = _mm([(THREAD_RADIUS - TIP_CHAMFER, -BOLT_LENGTH)])
     body += _mm([(THREAD_RADIUS, -BOLT_LENGTH + TIP_CHAMFER), (THREAD_RADIUS, 0.0)])
     return [
-        Piece("head", convex_revolve(crown, HEAD_FACETS), head, convex=True),
+        Piece("head", convex_revolve(crown, HEAD_FACETS, phase=0.5), head, convex=True),
         Piece("shank", convex_revolve(body, 8), Contact(FIT_FRICTION, 1e9), convex=True),
     ]
 
