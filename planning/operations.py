@@ -6,13 +6,15 @@ from collections.abc import Generator, Iterator
 from dataclasses import dataclass
 
 from cell.errors import CellError
-from cell.phase import Outcome, Phase
+from cell.phase import Outcome, Phase, after
 from cell.product import Fit, Product
 from planning.fasten import hold, place_bolt, release_hold, star_order, tighten_bolt
 from planning.insert_shaft import insert_shaft
 from planning.pick_place import pick_place
 from planning.planner import FixingPlan
 from planning.station import Station
+
+REST_TIME = 0.2  # [s] [A]
 
 
 class NoOperation(CellError):
@@ -105,7 +107,10 @@ def _tighten_bolts(station: Station, operation: Operation) -> Generator[Phase, O
     grasp = yield from hold(station, clamped)
     for bolt in star_order(station, operation.parts):
         yield from tighten_bolt(station, bolt)
-    yield from release_hold(station, clamped, grasp, frozenset([*station.fixed, *operation.parts]))
+    assembly = frozenset([*station.fixed, *operation.parts])
+    yield from release_hold(station, clamped, grasp, assembly)
+    # Nothing holds the assembly now but the jig: what it measures here is what the user gets.
+    yield Phase("assembly: rest", after(REST_TIME), timeout=1.0, awake=assembly)
 
 
 _PHASES = {
