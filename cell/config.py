@@ -97,12 +97,11 @@ class DriverConfig:
     seat_speed: float = setting(
         10.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0
     )
-    clutch_torque: float = setting(
-        0.5, "N m", "Torque at which it stops: M3 in a die-cast plate, 0.3 to 0.7 [A].",
-        above=0.0, at_most=1.0,
-    )  # fmt: skip
     push_force: float = setting(
         10.0, "N", "Thrust on the bit, 5 to 15 [A].", above=0.0, at_most=50.0
+    )
+    counter_hold: bool = setting(
+        True, "", "The left hand holds the clamped part against the torque; else the jig alone."
     )
 
 

@@ -169,7 +169,8 @@ def _torque_plots(run: Run, record: OperationRecord, log: Arrays) -> list[Pictur
             torques[bolt] = rows["spindle_torque"][-len(clamp) :]
     if not angles:
         return []
-    target = run.station.config.driver.clutch_torque
+    fasteners = run.station.cell.product.fasteners
+    target = fasteners[record.operation.parts[0]].torque
     whole = {bolt: angle - angle[0] for bolt, angle in angles.items()}
     last = {bolt: (angle - angle[-1])[angle > angle[-1] - LAST] for bolt, angle in angles.items()}
     ends = {bolt: torques[bolt][-len(angle) :] for bolt, angle in last.items()}

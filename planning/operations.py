@@ -8,11 +8,13 @@ from dataclasses import dataclass
 from cell.errors import CellError
 from cell.phase import Outcome, Phase, after
 from cell.product import Fit, Product
-from planning.fasten import hold, place_bolt, release_hold, star_order, tighten_bolt
+from planning.counter_hold import hold, park, release_hold
 from planning.insert_shaft import insert_shaft
 from planning.pick_place import pick_place
+from planning.place_bolts import place_bolt
 from planning.planner import FixingPlan
 from planning.station import Station
+from planning.tighten_bolts import star_order, tighten_bolt
 
 REST_TIME = 0.2  # [s] [A]
 
@@ -102,15 +104,22 @@ def _place_bolts(station: Station, operation: Operation) -> Iterator[Phase]:
 
 
 def _tighten_bolts(station: Station, operation: Operation) -> Generator[Phase, Outcome, None]:
-    fasteners = station.cell.product.fasteners
-    clamped = fasteners[operation.parts[0]].clamps
-    grasp = yield from hold(station, clamped)
-    for bolt in star_order(station, operation.parts):
-        yield from tighten_bolt(station, bolt)
+    clamped = station.cell.product.fasteners[operation.parts[0]].clamps
     assembly = frozenset([*station.fixed, *operation.parts])
-    yield from release_hold(station, clamped, grasp, assembly)
+    if station.config.driver.counter_hold:
+        grasp = yield from hold(station, clamped)
+        yield from _drive(station, operation.parts)
+        yield from release_hold(station, clamped, grasp, assembly)
+    else:
+        yield from park(station)
+        yield from _drive(station, operation.parts)
     # Nothing holds the assembly now but the jig: what it measures here is what the user gets.
     yield Phase("assembly: rest", after(REST_TIME), timeout=1.0, awake=assembly)
+
+
+def _drive(station: Station, bolts: tuple[str, ...]) -> Iterator[Phase]:
+    for bolt in star_order(station, bolts):
+        yield from tighten_bolt(station, bolt)
 
 
 _PHASES = {

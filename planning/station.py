@@ -23,6 +23,7 @@ from planning.kinematics import Unreachable, ik_solutions, tool_pose
 from planning.motion import plan_line, plan_path
 from planning.timing import JointMotion, time_path
 
+FINE_CLEARANCE = 5e-4  # Kept next to neighbours of a hole; smaller than any gap there [m] [A].
 SINGULAR_SINE = 0.2  # Of wrist 2 and of the elbow [A].
 WOUND_UP = np.deg2rad(310.0)  # Joints turn by 360 degrees either way [A].
 

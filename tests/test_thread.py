@@ -100,7 +100,7 @@ def tighten(rig: ThreadRig) -> tuple[float, float]:
         rig.keep_thrust()
         rig.step()
         torque = rig.driver.torque(rig.context)
-        if torque >= rig.config.clutch_torque:
+        if torque >= rig.thread.fastener.torque:
             return torque, rig.thread.clamp_force(rig.context)
     raise AssertionError("the clutch did not trip")
 
