@@ -32,11 +32,17 @@ CAMERA = ((0.8, 1.9, 1.25), (0.0, 0.05, 0.25))  # Where it stands and what it lo
 
 
 class MembraneFilm(LeafSystem):
-    """Shows the jig's surface each time it has changed."""
+    """Shows the jig's surface each time it has changed.
 
-    def __init__(self, cell: Cell, meshcat: Meshcat) -> None:
+    Args:
+        cell: Whose jig.
+        meshcat: Where to show it.
+        still: Path of the surface that the visualizer shows, to be hidden.
+    """
+
+    def __init__(self, cell: Cell, meshcat: Meshcat, still: str) -> None:
         super().__init__()
-        self.cell, self.meshcat = cell, meshcat
+        self.cell, self.meshcat, self.still = cell, meshcat, still
         self.count = 0
         self._shown: np.ndarray | None = None
         self.DeclarePeriodicPublishEvent(MEMBRANE_PERIOD, 0.0, self._publish)
@@ -53,6 +59,8 @@ class MembraneFilm(LeafSystem):
             self.meshcat.SetProperty(path, "visible", False, 0.0)
             self.meshcat.SetProperty(f"/membrane/{self.count - 1}", "visible", False, time)
         self.meshcat.SetProperty(path, "visible", True, time)
+        # Each time: the visualizer forgets it when a simulation is initialized.
+        self.meshcat.SetProperty(self.still, "visible", False, 0.0)
         self.count += 1
 
 
@@ -80,8 +88,8 @@ class Replay:
             return
         params = MeshcatVisualizerParams(publish_period=FRAME_PERIOD)
         MeshcatVisualizer.AddToBuilder(builder, cell.scene_graph, self.meshcat, params)
-        self.meshcat.SetProperty(membrane_path(cell, params.prefix), "visible", False)
-        builder.AddSystem(MembraneFilm(cell, self.meshcat))
+        still = membrane_path(cell, params.prefix)
+        builder.AddSystem(MembraneFilm(cell, self.meshcat, still))
         self.meshcat.SetCameraPose(*CAMERA)
         if self.file is not None:
             self.meshcat.StartRecording(
