@@ -205,6 +205,23 @@ def test_interrupted_run_continues_bit_identically(placed: Path) -> None:
 
 
 @pytest.mark.slow
+def test_kinetic_energy_does_not_grow_at_rest(placed: Path) -> None:
+    """Every part awake, in the tray and on the jig, for 5 s after 0.5 s to come to rest."""
+    simulation, _ = running_cell(PRODUCT, CONFIG, seed=0)
+    restore_state(simulation, read_state(placed / "state.npz"))
+    parts = list(simulation.cell.parts)
+    awake = frozenset(part.part.name for part in parts)
+    simulation.run_phase(Phase("come to rest", after(0.5), 1.0, awake=awake))
+    energies = []
+    for _ in range(10):
+        simulation.run_phase(Phase("rest", after(0.5), 1.0, awake=awake))
+        energies.append(sum(part.kinetic_energy(simulation.context) for part in parts))
+    # A nanojoule is 0.1 mm/s of the motor: the creep of contact regularisation is far below.
+    assert max(energies) < 1e-9
+    assert max(energies[5:]) <= max(energies[:5]) + 1e-10
+
+
+@pytest.mark.slow
 def test_whole_assembly_succeeds(tmp_path: Path) -> None:
     assert run_assemble(**options(tmp_path)) == 0
     result = result_in(tmp_path)
