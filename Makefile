@@ -9,8 +9,8 @@ ARGS ?=
 
 help:
 	@echo "make setup      environment from the lock file, and what rendering needs of the system"
-	@echo "make run        assemble the motor unit in the twin; report in out/run (ARGS=... adds options)"
-	@echo "make test       fast tests"
+	@echo "make run        set up, then assemble the motor unit in the twin; report in out/run (ARGS=... adds options)"
+	@echo "make test       set up, then run the fast tests"
 	@echo "make test-slow  long simulations"
 	@echo "make check      style, types"
 	@echo "make format     rewrite the sources in the project's style"
@@ -19,10 +19,10 @@ help:
 
 setup: system $(INSTALLED)
 
-run: $(INSTALLED)
+run: setup
 	$(BIN)/soft-jig assemble --out out/run $(ARGS)
 
-test: $(INSTALLED)
+test: setup
 	$(BIN)/python -m pytest -n auto $(ARGS)
 
 test-slow: $(INSTALLED)
