@@ -15,9 +15,9 @@ from experiments.progress import Progress, result_table
 from experiments.replay import Replay
 from experiments.results import write_infeasible, write_results
 from experiments.run import Run, go_on, read_final_state
-from planning.explain import stop_text
-from planning.operations import NoOperation, Operation, operations
-from planning.planner import FixingPlan, plan
+from planning.fixing.explain import stop_text
+from planning.fixing.planner import FixingPlan, plan
+from planning.operations.sequence import NoOperation, Operation, operations
 
 
 def run_assemble(

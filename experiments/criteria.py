@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.operations import Operation
+from planning.operations.sequence import Operation
 
 
 @dataclass(frozen=True)

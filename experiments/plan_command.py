@@ -7,9 +7,9 @@ from pathlib import Path
 from rich.console import Console
 
 from cell.loading import load_product
-from planning.explain import explanation, step_table, step_text, stop_text
-from planning.plan_file import save_plan
-from planning.planner import FixingPlan, plan
+from planning.fixing.explain import explanation, step_table, step_text, stop_text
+from planning.fixing.plan_file import save_plan
+from planning.fixing.planner import FixingPlan, plan
 
 MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, also into a file.
 

@@ -13,7 +13,7 @@ from cell.errors import CellError
 from cell.product import Product
 from cell.simulation import Simulation
 from experiments.replay import Replay
-from planning.station import Station
+from planning.operations.station import Station
 
 
 @dataclass(frozen=True)

@@ -11,7 +11,7 @@ from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from experiments.snapshot import Snapshot
-from planning.operations import Operation
+from planning.operations.sequence import Operation
 
 Arrays = Mapping[str, np.ndarray]
 

@@ -20,8 +20,8 @@ from experiments.prepare import Disturbance
 from experiments.record import Arrays, OperationRecord, rows_of
 from experiments.report import Picture, write_report
 from experiments.run import Run, StepResult, final_state
-from planning.plan_file import plan_to_dict
-from planning.planner import FixingPlan
+from planning.fixing.plan_file import plan_to_dict
+from planning.fixing.planner import FixingPlan
 
 PACKAGES = ("soft-jig-cell", "drake", "numpy", "scipy", "ompl", "trimesh")
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")

@@ -19,8 +19,8 @@ from experiments.criteria import FailedCheck, failed_checks
 from experiments.metrics.measure import measure
 from experiments.record import OperationRecord, PhaseRecord
 from experiments.snapshot import take_snapshot
-from planning.operations import Operation, phases
-from planning.station import Station
+from planning.operations.sequence import Operation, phases
+from planning.operations.station import Station
 
 DONE = "operations_done"  # In a saved state: names of the operations before it.
 

@@ -13,7 +13,7 @@ from pydrake.multibody.tree import QuaternionFloatingJoint
 from cell.arm import Arm, add_arm
 from cell.config import ArmConfig
 from cell.paths import model_url, new_parser
-from planning.collision_model import CollisionModel
+from planning.motion.collision_model import CollisionModel
 
 P_WJ = [0.0, 0.15, 0.20]
 TOOL_DOWN = RollPitchYaw(np.pi, 0.0, 0.0)

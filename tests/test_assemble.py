@@ -20,8 +20,8 @@ from experiments.assemble import run_assemble, run_job
 from experiments.job import Job
 from experiments.prepare import Disturbance, running_cell
 from experiments.run import Run, go_on
-from planning.operations import Operation, operations, phases
-from planning.planner import plan
+from planning.fixing.planner import plan
+from planning.operations.sequence import Operation, operations, phases
 
 PRODUCT = load_product("motor_unit")
 CONFIG = CellConfig()

@@ -17,10 +17,10 @@ from tiny_products import (
     tube_and_pins,
 )
 
-from planning.directions import DIRECTIONS, opposite, unit_vector
-from planning.envelope import envelope
-from planning.interference import FIT_TOLERANCE, first_hit, interference
-from planning.solids import Solid, solids_of
+from planning.fixing.directions import DIRECTIONS, opposite, unit_vector
+from planning.fixing.envelope import envelope
+from planning.fixing.interference import FIT_TOLERANCE, first_hit, interference
+from planning.fixing.solids import Solid, solids_of
 
 PRODUCTS = [peg_in_hole, interlocked_links, stack_of_three, tube_and_pins]
 

@@ -8,8 +8,8 @@ from planning_cell import TOOL_DOWN, planning_cell
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.arm import Arm
-from planning.collision_model import CollisionModel
-from planning.kinematics import (
+from planning.motion.collision_model import CollisionModel
+from planning.motion.kinematics import (
     LIMIT_MARGIN,
     Unreachable,
     flange_pose,

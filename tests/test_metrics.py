@@ -14,7 +14,7 @@ from experiments.metrics.insert import seat_errors
 from experiments.metrics.place import placement_errors
 from experiments.record import OperationRecord, PhaseRecord, rows_between
 from experiments.snapshot import Snapshot, Wrench
-from planning.operations import Operation
+from planning.operations.sequence import Operation
 
 PRODUCT = load_product("motor_unit")
 BOLT = PRODUCT.fasteners["bolt_1"]

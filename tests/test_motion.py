@@ -9,11 +9,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import SpatialInertia
 
 from cell.errors import UnknownName
-from planning.collision_model import CollisionModel, Surroundings
-from planning.joint_path import JointPath
-from planning.kinematics import solve_ik, tool_pose
-from planning.motion import NoPath, plan_line, plan_path
-from planning.timing import JointMotion, NoTiming, time_path
+from planning.motion.collision_model import CollisionModel, Surroundings
+from planning.motion.joint_path import JointPath
+from planning.motion.kinematics import solve_ik, tool_pose
+from planning.motion.paths import NoPath, plan_line, plan_path
+from planning.motion.timing import JointMotion, NoTiming, time_path
 
 SPEED, ACCELERATION = 0.3, 4.0
 

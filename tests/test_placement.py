@@ -10,8 +10,8 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cell import load_product
-from planning.placement import pose_on_jig, upright
-from planning.station import Station
+from planning.operations.placement import pose_on_jig, upright
+from planning.operations.station import Station
 
 X_WJ = RigidTransform([0.0, 0.15, 0.20])
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")

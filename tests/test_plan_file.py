@@ -20,9 +20,9 @@ import experiments.plan_command as plan_command
 from cell.errors import CellError
 from experiments.plan_command import run_plan
 from planning import FixingPlan, load_plan, plan, save_plan
-from planning.directions import DIRECTIONS
-from planning.explain import explanation, stop_text
-from planning.plan_file import plan_to_dict
+from planning.fixing.directions import DIRECTIONS
+from planning.fixing.explain import explanation, stop_text
+from planning.fixing.plan_file import plan_to_dict
 
 PRODUCTS = [peg_in_hole, interlocked_links, stack_of_three, tube_and_pins]
 

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from planning.station import Station
-from planning.tighten_bolts import star_order
+from planning.operations.station import Station
+from planning.operations.tighten_bolts import star_order
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:

@@ -16,7 +16,7 @@ from experiments.record import (
     rows_of,
 )
 from experiments.snapshot import Snapshot
-from planning.placement import YAWS, upright
+from planning.operations.placement import YAWS, upright
 
 
 def measure_place(cell: Cell, record: OperationRecord, log: Arrays) -> Measured:

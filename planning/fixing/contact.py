@@ -19,7 +19,7 @@ from itertools import combinations
 import fcl
 import numpy as np
 
-from planning.solids import Solid, boxes_apart
+from planning.fixing.solids import Solid, boxes_apart
 
 
 def surface_gap(a: Solid, b: Solid) -> float:

@@ -17,11 +17,11 @@ from cell.builder import Cell, add_arms, add_workcell
 from cell.config import CellConfig
 from cell.parts import add_parts
 from cell.product import Part, Product
-from planning.collision_model import CollisionModel, Surroundings
-from planning.joint_path import JointPath
-from planning.kinematics import Unreachable, ik_solutions, tool_pose
-from planning.motion import plan_line, plan_path
-from planning.timing import JointMotion, time_path
+from planning.motion.collision_model import CollisionModel, Surroundings
+from planning.motion.joint_path import JointPath
+from planning.motion.kinematics import Unreachable, ik_solutions, tool_pose
+from planning.motion.paths import plan_line, plan_path
+from planning.motion.timing import JointMotion, time_path
 
 FINE_CLEARANCE = 5e-4  # Kept next to neighbours of a hole; smaller than any gap there [m] [A].
 SINGULAR_SINE = 0.2  # Of wrist 2 and of the elbow [A].

@@ -10,14 +10,14 @@ import numpy as np
 
 from cell.errors import CellError, UnknownName
 from cell.product import Product
-from planning.checks import without_overlaps
-from planning.contact import contact_matrix
-from planning.directions import DIRECTIONS
-from planning.fixing import FixingStep, Geometry, Stop, configure_fixing
-from planning.interference import FIT_TOLERANCE, Blocker, interference
-from planning.order import check_order, default_order
-from planning.reachability import reachable_matrices
-from planning.solids import solids_of
+from planning.fixing.algorithm import FixingStep, Geometry, Stop, configure_fixing
+from planning.fixing.checks import without_overlaps
+from planning.fixing.contact import contact_matrix
+from planning.fixing.directions import DIRECTIONS
+from planning.fixing.interference import FIT_TOLERANCE, Blocker, interference
+from planning.fixing.order import check_order, default_order
+from planning.fixing.reachability import reachable_matrices
+from planning.fixing.solids import solids_of
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,13 +8,13 @@ from dataclasses import dataclass
 from cell.errors import CellError
 from cell.phase import Outcome, Phase, after
 from cell.product import Fit, Product
-from planning.counter_hold import hold, park, release_hold
-from planning.insert_shaft import insert_shaft
-from planning.pick_place import pick_place
-from planning.place_bolts import place_bolt
-from planning.planner import FixingPlan
-from planning.station import Station
-from planning.tighten_bolts import star_order, tighten_bolt
+from planning.fixing.planner import FixingPlan
+from planning.operations.counter_hold import hold, park, release_hold
+from planning.operations.insert_shaft import insert_shaft
+from planning.operations.pick_place import pick_place
+from planning.operations.place_bolts import place_bolt
+from planning.operations.station import Station
+from planning.operations.tighten_bolts import star_order, tighten_bolt
 
 REST_TIME = 0.2  # [s] [A]
 

@@ -17,7 +17,7 @@ from pydrake.multibody.tree import Frame
 from cell.config import InsertionConfig
 from cell.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
 from cell.product import Fit
-from planning.grasping import (
+from planning.operations.grasping import (
     HAND_SPEED,
     Reach,
     first,
@@ -26,7 +26,7 @@ from planning.grasping import (
     reachable_grasps,
     take,
 )
-from planning.station import Station
+from planning.operations.station import Station
 
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].

@@ -6,8 +6,16 @@ from collections.abc import Generator, Iterator
 
 from cell.phase import Outcome, Phase, motion_finished
 from cell.product import Grasp
-from planning.grasping import HAND_SPEED, Reach, first, grip, let_go, opened, reachable_grasps
-from planning.station import Station
+from planning.operations.grasping import (
+    HAND_SPEED,
+    Reach,
+    first,
+    grip,
+    let_go,
+    opened,
+    reachable_grasps,
+)
+from planning.operations.station import Station
 
 RETREAT = 0.05
 

@@ -15,9 +15,9 @@ from pydrake.systems.framework import Context
 
 from cell.arm import Arm
 from cell.errors import CellError
-from planning.collision_model import EDGE_STEP, CollisionModel
-from planning.joint_path import JointPath
-from planning.kinematics import Unreachable, ik_solutions, joint_limits, tool_pose
+from planning.motion.collision_model import EDGE_STEP, CollisionModel
+from planning.motion.joint_path import JointPath
+from planning.motion.kinematics import Unreachable, ik_solutions, joint_limits, tool_pose
 
 CORNER_RADIUS = 0.15  # Rounding of the corners of a planned path [rad] [A].
 SHORTCUTS = 100  # Attempts to shorten a planned path [A].

@@ -7,10 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from rich.table import Table
 
-from planning.directions import DIRECTIONS, open_directions
-from planning.fixing import READING, FixingStep, Stop
-from planning.interference import Blocker
-from planning.planner import FixingPlan
+from planning.fixing.algorithm import READING, FixingStep, Stop
+from planning.fixing.directions import DIRECTIONS, open_directions
+from planning.fixing.interference import Blocker
+from planning.fixing.planner import FixingPlan
 
 
 def step_table(plan: FixingPlan) -> Table:

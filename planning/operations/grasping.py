@@ -11,8 +11,8 @@ from pydrake.math import RigidTransform
 from cell.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
 from cell.product import Grasp
 from cell.tools import JAW_SETBACK
-from planning.kinematics import Unreachable
-from planning.station import Station
+from planning.motion.kinematics import Unreachable
+from planning.operations.station import Station
 
 APPROACH = 0.05  # The jaw comes the last stretch straight along its own z [m] [A].
 CLEARANCE = 0.004  # The jaws open this much wider than the part [m] [A].

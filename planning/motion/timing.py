@@ -14,7 +14,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from cell.arm import Arm
 from cell.errors import CellError
 from cell.paths import model_url, new_parser
-from planning.joint_path import JointPath
+from planning.motion.joint_path import JointPath
 
 GRID_STEP = 0.05  # Between two points at which the limits are imposed [rad] [A].
 INSET = 1e-3  # Of the outermost of these points of a segment, as a share of its length.

@@ -11,7 +11,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from planning.directions import DIRECTIONS
+from planning.fixing.directions import DIRECTIONS
 
 
 def reachable_matrices(

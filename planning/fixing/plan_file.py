@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from cell.errors import CellError
-from planning.directions import DIRECTIONS
-from planning.fixing import READING, FixingStep, Stop
-from planning.interference import Blocker
-from planning.planner import FixingPlan
+from planning.fixing.algorithm import READING, FixingStep, Stop
+from planning.fixing.directions import DIRECTIONS
+from planning.fixing.interference import Blocker
+from planning.fixing.planner import FixingPlan
 
 
 def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:

@@ -12,7 +12,7 @@ import numpy as np
 
 from cell.errors import BadPart
 from cell.product import Part, Product
-from planning.directions import unit_vector
+from planning.fixing.directions import unit_vector
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,9 @@
 Where the paper leaves room, it is read as follows; ``READING`` says the same in ``plan.json``.
 
 Direction: A_j(P_t, P_i) = 1 means that the incoming P_i leaves the target P_t along j
-(``planning.reachability``). The posture is that j: the direction in which the incoming part lies
-relative to the target. It is not an orientation: the product stands on the jig with its own ``up``
-axis up in every step, as in all four entries of the paper's table.
+(``planning.fixing.reachability``). The posture is that j: the direction in which the incoming part
+lies relative to the target. It is not an orientation: the product stands on the jig with its own
+``up`` axis up in every step, as in all four entries of the paper's table.
 
 Bottom part: j along ``up``: the incoming part comes from above, and the target is at the bottom,
 fixed by the part that was fixed before. j against ``up``: the incoming part is at the bottom and
@@ -25,11 +25,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.product import Product
-from planning.contact import surface_gap
-from planning.directions import DIRECTIONS, axis_index, open_directions, opposite
-from planning.interference import Blocker, Interference
-from planning.reachability import reachable_directions, touching
-from planning.solids import Solid, cog_height
+from planning.fixing.contact import surface_gap
+from planning.fixing.directions import DIRECTIONS, axis_index, open_directions, opposite
+from planning.fixing.interference import Blocker, Interference
+from planning.fixing.reachability import reachable_directions, touching
+from planning.fixing.solids import Solid, cog_height
 
 READING = (
     "A_j = 1: the incoming part leaves the target along j (column reading of W_j). Posture: the "

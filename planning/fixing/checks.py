@@ -13,7 +13,7 @@ from itertools import combinations
 
 from cell.errors import CellError
 from cell.product import Product
-from planning.solids import Solid, boxes_apart
+from planning.fixing.solids import Solid, boxes_apart
 
 THREAD_HEIGHT_PER_PITCH = 0.5413  # [S] ISO 68-1: 5/8 H = 0.5413 P from major to minor diameter.
 

@@ -15,10 +15,10 @@ from pydrake.multibody.tree import Frame
 
 from cell.phase import Follow, Phase, Sensed, after, motion_finished
 from cell.thread import BIT_SEAT, Thread, ThreadState
-from planning.grasping import backed_off
-from planning.kinematics import Unreachable
-from planning.station import FINE_CLEARANCE, Station
-from planning.timing import JointMotion
+from planning.motion.kinematics import Unreachable
+from planning.motion.timing import JointMotion
+from planning.operations.grasping import backed_off
+from planning.operations.station import FINE_CLEARANCE, Station
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 LEAVE_SPEED = 0.1  # Of the bit out of it [m/s] [A].

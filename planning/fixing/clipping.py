@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import manifold3d
 import numpy as np
 
-from planning.envelope import cross
+from planning.fixing.envelope import cross
 
 
 @dataclass(frozen=True, eq=False)

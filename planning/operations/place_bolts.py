@@ -11,7 +11,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.phase import Phase, after, motion_finished
-from planning.grasping import (
+from planning.operations.grasping import (
     Reach,
     let_go,
     lost_grasp,
@@ -19,8 +19,8 @@ from planning.grasping import (
     reachable_grasps,
     take,
 )
-from planning.insert_shaft import raised
-from planning.station import FINE_CLEARANCE, Station
+from planning.operations.insert_shaft import raised
+from planning.operations.station import FINE_CLEARANCE, Station
 
 LIFT = 0.06
 ABOVE = 0.012  # A bolt hovers this far above where it will stand: its tip is over the hole [m] [A].

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.solids import Solid
+from planning.fixing.solids import Solid
 
 # Right-handed (u, v, h): coordinates across the axis, and height h along it.
 PLANE = {0: (1, 2, 0), 1: (2, 0, 1), 2: (0, 1, 2)}

@@ -10,7 +10,8 @@ from cell.events import evacuate_jig, inflate_jig, soften_jig
 from cell.phase import Condition, Phase, Sensed, after, motion_finished
 from cell.product import Grasp
 from cell.soft_jig import JigState
-from planning.grasping import (
+from planning.motion.kinematics import Unreachable
+from planning.operations.grasping import (
     Reach,
     let_go,
     lost_grasp,
@@ -18,9 +19,8 @@ from planning.grasping import (
     reachable_grasps,
     take,
 )
-from planning.kinematics import Unreachable
-from planning.placement import Placement, choose_placement
-from planning.station import Station
+from planning.operations.placement import Placement, choose_placement
+from planning.operations.station import Station
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
 PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M].

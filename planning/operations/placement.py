@@ -12,9 +12,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from planning.grasping import Reach
-from planning.kinematics import Unreachable
-from planning.station import Station
+from planning.motion.kinematics import Unreachable
+from planning.operations.grasping import Reach
+from planning.operations.station import Station
 
 YAWS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 HOVER = 0.008  # The part waits this far above the bag before it is pressed in [m] [A].

@@ -18,10 +18,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.clipping import Polygons, point_in_wide_union, triangle_overlaps
-from planning.directions import DIRECTIONS, axis_index, opposite, unit_vector
-from planning.envelope import PLANE, Envelope, Faces, envelope
-from planning.solids import Solid
+from planning.fixing.clipping import Polygons, point_in_wide_union, triangle_overlaps
+from planning.fixing.directions import DIRECTIONS, axis_index, opposite, unit_vector
+from planning.fixing.envelope import PLANE, Envelope, Faces, envelope
+from planning.fixing.solids import Solid
 
 # [m] [A] Above the sagitta r (1 - cos(pi / n)) of usual facets (7 um for r 6 mm, n 64) and the
 # rounding of mesh files, below any overlap that matters: the decisions for the motor unit stay the

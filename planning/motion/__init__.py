@@ -1,0 +1,1 @@
+"""How an arm gets somewhere: kinematics, collisions, paths, timing."""
