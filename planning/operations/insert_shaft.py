@@ -223,10 +223,3 @@ def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> T
         return RigidTransform(X.rotation(), X.translation() + offset)
 
     return target
-
-
-def seat_errors(station: Station, fit: Fit) -> tuple[float, float]:
-    """Return the measured gap [m] and tilt [rad] of the seated part."""
-    X_GoalP = goal_pose(station, fit).InvertAndCompose(station.sense(fit.hole))
-    tilt = float(np.arccos(np.clip(X_GoalP.rotation().matrix()[2, 2], -1.0, 1.0)))
-    return float(X_GoalP.translation()[2]), tilt
