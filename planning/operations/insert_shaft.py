@@ -36,6 +36,7 @@ BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand
 RETREAT = 0.08
 STALL_SPEED = 5e-4  # Slower than this is standing [m/s].
 STALL_TIME = 0.25
+PATIENCE = 5.0  # For coming to a stand under the whole force [s] [A].
 YAW_STIFFNESS = 40.0  # About the axis of the hole; the bolt holes must meet [N m/rad] [A].
 LATERAL_LIMIT = 15.0  # [N] [A]
 TORQUE_LIMIT = 1.0  # [N m] [A]
@@ -163,8 +164,7 @@ def _insert(
         return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
 
     start = fit.depth + NEAR
-    down = sinking(X_WSeat, start, config)
-    outcome = yield soft("insert", config.force_limit, down, Stalled(height), 6.0)
+    outcome = yield soft("insert", config.force_limit, *descent(X_WSeat, start, config, height))
     if gap(outcome) > fit.depth / 2:
         mouth = gap(outcome)
         search = spiral(X_WSeat, mouth - BEYOND, config)
@@ -174,8 +174,8 @@ def _insert(
 
         length = config.search_radius**2 * np.pi / config.search_pitch
         yield soft("search", config.search_force, search, found, length / config.search_speed)
-        down = sinking(X_WSeat, mouth - 1e-3, config)
-        outcome = yield soft("insert again", config.force_limit, down, Stalled(height), 6.0)
+        again = descent(X_WSeat, mouth - 1e-3, config, height)
+        outcome = yield soft("insert again", config.force_limit, *again)
 
 
 def too_much_force(sensed: Sensed) -> str | None:
@@ -198,15 +198,30 @@ def impedance(
     )
 
 
-def sinking(X_WSeat: RigidTransform, start: float, config: InsertionConfig) -> Target:
-    """Return a target that sinks from ``start`` above the seat [m] to below it.
+def descent(
+    X_WSeat: RigidTransform,
+    start: float,
+    config: InsertionConfig,
+    height: Callable[[Sensed], np.ndarray],
+) -> tuple[Target, Condition, float]:
+    """Return target, end condition and time-out of a descent from ``start`` above the seat [m].
 
-    It slows down around the seat, which metal meets metal at, and then builds up the force.
+    The target slows down around the seat, where metal meets metal, and then builds up the force.
+    Only what stands still under the whole force has come to its end: a part that leans on an edge
+    stands still before.
     """
     heights = [start, LANDING, -LANDING, -BEYOND]
     speeds = [config.speed, config.landing_speed, config.speed]
     times = np.cumsum([0.0, *(-np.diff(heights) / speeds)])
-    return lambda t: raised(X_WSeat, float(np.interp(t, times, heights)))
+    stalled = Stalled(height)
+
+    def target(t: float) -> RigidTransform:
+        return raised(X_WSeat, float(np.interp(t, times, heights)))
+
+    def until(sensed: Sensed) -> bool:
+        return stalled(sensed) and sensed.time >= times[-1] + STALL_TIME
+
+    return target, until, float(times[-1]) + PATIENCE
 
 
 def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:
