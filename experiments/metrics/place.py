@@ -78,7 +78,7 @@ def _kick(cell: Cell, part: str, name: str, phases: list[PhaseRecord], rows: Arr
 
 
 def _depth(cell: Cell, part: str, snapshot: Snapshot) -> float:
-    """Return how far the part's lowest point (of a motor: its terminals) is below the apex of the inflated bag [m]."""
+    """Return how far the lowest point (a motor's terminals) is below the inflated apex [m]."""
     X_JP = snapshot.X_JP(part)
     points = cell.product.parts[part].mesh.vertices @ X_JP.rotation().matrix().T
     lowest = float(points[:, 2].min() + X_JP.translation()[2])
