@@ -26,6 +26,7 @@ from cell.cad.shapes import (
     convex_revolve,
     cylinder,
     hexagon_prism,
+    open_band,
     revolved_surface,
     shank,
     to_trimesh,
@@ -58,7 +59,7 @@ PLATE_X, PLATE_Y_LOW, PLATE_Y_HIGH, PLATE_THICKNESS = 35.0, -33.0, 27.0, 5.0
 FOOT_THICKNESS, FOOT_BOTTOM = 5.0, -15.0
 FOOT_HOLE_RADIUS, FOOT_HOLE_X, FOOT_HOLE_Z = 2.25, 29.0, -10.0
 BOLT_HOLE_RADIUS = 1.7
-WASHER_RADIUS = 3.4  # [D] more than the head's 2.75; at 3.5 it would fill the bore's chamfer.
+WASHER_RADIUS = 3.4  # [D] of what carries the clamp; at 3.5 it would fill the bore's chamfer.
 ALUMINIUM = 2700.0  # kg/m3; the material is not in the files [A].
 
 # Bolts: six, every 60 degrees about the gearbox axis [M]; socket head cap screw.
@@ -66,6 +67,7 @@ BOLT_CIRCLE = 15.5
 BOLT_ANGLES_DEG = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)
 THREAD_RADIUS, BOLT_LENGTH, TIP_CHAMFER = 1.5, 10.0, 0.3
 HEAD_RADIUS, HEAD_HEIGHT = 2.75, 3.0
+BEARING_RADIUS = 2.5  # [R] ISO 4762: 2.53 or more; less what the corners of a hexagon need.
 SOCKET_FLATS, SOCKET_DEPTH = 2.5, 2.0  # [M] 1.3 to 2 mm deep; 2 gives the measured volume.
 THREAD_PITCH = 0.5
 STEEL = 7850.0  # kg/m3
@@ -85,21 +87,22 @@ ANODISED, BLACK_OXIDE, DARK = (0.62, 0.70, 0.80), (0.16, 0.16, 0.18), (0.28, 0.2
 
 # Contact meshes [M]: a step costs about 8 us for every contact polygon.
 BOSS_FACETS = 32  # Mean radius is kept; corners and flats differ by 14 um of 75 um clearance.
-WASHER_FACETS = 8
+WASHER_FACETS, HOLE_FACETS = 6, 8
 # The gearbox is felt twice: its face, compliant, by the plate; its side, rigid, by bed and jaws.
 # Under a bolt the face yields like the clamped aluminium, 3.5e8 N/m [D]: a modulus of 1e10 over
-# half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m.
+# half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m [D].
 SEAT_FACETS, SEAT_DEPTH, SEAT_GAP = 8, 1.5, 0.2
 HEAD_FACETS = 12  # A flat under each of the jaws, for grasps every 30 degrees.
+HEAD_STIFFNESS = 1e8  # N/m
 
 
 def lumped_head_friction() -> float:
     """Return the friction under the head that alone gives the nut factor K.
 
     K d = P / (2 pi) + mu r_eff, with r_eff = 2/3 (ro^3 - ri^3) / (ro^2 - ri^2) of the annulus
-    between the bolt's hole and the rim of its head: the thread itself is simulated frictionless.
+    that the head bears on: the thread itself is simulated frictionless.
     """
-    ro, ri = HEAD_RADIUS, BOLT_HOLE_RADIUS
+    ro, ri = BEARING_RADIUS, BOLT_HOLE_RADIUS
     r_eff = 2.0 / 3.0 * (ro**3 - ri**3) / (ro**2 - ri**2)
     return (NUT_FACTOR * 2.0 * THREAD_RADIUS - THREAD_PITCH / (2.0 * np.pi)) / r_eff
 
@@ -225,12 +228,23 @@ def plate_pieces() -> list[Piece]:
     """
     washer = Contact(lumped_head_friction())
     pieces = [Piece("bore", _bore_ring(), Contact(FIT_FRICTION))]
-    top, outer = PLATE_THICKNESS, WASHER_RADIUS
-    profile = [(BOLT_HOLE_RADIUS, 0.0), (outer, 0.0), (outer, top), (BOLT_HOLE_RADIUS, top)]
     for k, (x, y) in enumerate(bolt_xy()):
-        ring = revolved_surface(_mm(profile), WASHER_FACETS, center=(x * MM, y * MM))
-        pieces.append(Piece(f"washer_{k}", ring, washer))
+        pieces.append(Piece(f"washer_{k}", _washer((x * MM, y * MM)), washer))
     return pieces + _plate_boxes()
+
+
+def _washer(center: tuple[float, float]) -> trimesh.Trimesh:
+    """Return what is felt around a bolt's hole [m]: under the head, on the seat, and the wall.
+
+    The wall ends short of both faces: where they are pressed in by micrometres it would only cost.
+    """
+    top, gap = PLATE_THICKNESS, 0.1
+    head = [(BEARING_RADIUS, top), (BOLT_HOLE_RADIUS, top)]
+    wall = [(BOLT_HOLE_RADIUS, top - gap), (BOLT_HOLE_RADIUS, gap)]
+    seat = [(BOLT_HOLE_RADIUS, 0.0), (WASHER_RADIUS, 0.0)]
+    facets = (WASHER_FACETS, HOLE_FACETS, WASHER_FACETS)
+    bands = zip((head, wall, seat), facets, strict=True)
+    return trimesh.util.concatenate([open_band(_mm(line), n, center) for line, n in bands])
 
 
 # Of the ring's section only the chamfers and the bore itself: the rest can touch nothing.
@@ -265,7 +279,9 @@ def _plate_boxes() -> list[Piece]:
 
 def bolt_pieces() -> list[Piece]:
     """Return the bolt's contact pieces."""
-    head = Contact(lumped_head_friction(), METAL_MODULUS)
+    # As a convex solid its pressure grows evenly from its underside to its middle.
+    bearing = np.pi * (BEARING_RADIUS**2 - BOLT_HOLE_RADIUS**2) * MM**2
+    head = Contact(lumped_head_friction(), HEAD_STIFFNESS * HEAD_HEIGHT / 2 * MM / bearing)
     crown = _mm([(HEAD_RADIUS, 0.0), (HEAD_RADIUS, HEAD_HEIGHT)])
     body = _mm([(THREAD_RADIUS - TIP_CHAMFER, -BOLT_LENGTH)])
     body += _mm([(THREAD_RADIUS, -BOLT_LENGTH + TIP_CHAMFER), (THREAD_RADIUS, 0.0)])
