@@ -127,12 +127,24 @@ def test_plate_boxes_leave_the_gearbox_alone() -> None:
 
 def test_head_friction_reproduces_the_nut_factor() -> None:
     """Integrate friction over the annulus in rings: torque per newton of clamp is K d."""
-    edges = np.linspace(mu.BOLT_HOLE_RADIUS, mu.BEARING_RADIUS, 10_001)
+    edges = np.linspace(mu.BOLT_HOLE_RADIUS + mu.BOLT_HOLE_EDGE, mu.BEARING_RADIUS, 10_001)
     middle, weight = (edges[1:] + edges[:-1]) / 2, np.diff(edges**2)
     arm = np.sum(middle * weight) / np.sum(weight)
     torque = mu.lumped_head_friction() * arm + mu.THREAD_PITCH / (2 * np.pi)
     assert torque == pytest.approx(0.202 * 3.0, rel=1e-6)
     assert load_product("motor_unit").fasteners["bolt_1"].nut_factor == mu.NUT_FACTOR
+
+
+def test_shank_meets_the_wall_of_its_hole_before_any_edge_of_the_faces() -> None:
+    washer = surfaces(mu.plate_model())["washer_0"]
+    xy = washer.vertices[:, :2] - np.array(mu.bolt_xy()[0]) * 1e-3
+    radius, on_wall = np.linalg.norm(xy, axis=1), washer.vertices[:, 2] % 5e-3 > 1e-6
+    angles = np.arctan2(xy[on_wall, 1], xy[on_wall, 0])
+    flat = radius[~on_wall].min() * np.cos(np.pi / mu.WASHER_FACETS)
+    off_flat = (angles - np.pi / mu.WASHER_FACETS) % (2 * np.pi / mu.WASHER_FACETS)
+    off_flat = np.minimum(off_flat, 2 * np.pi / mu.WASHER_FACETS - off_flat)
+    assert on_wall.sum() == 2 * mu.HOLE_FACETS
+    assert np.all(radius[on_wall] < flat / np.cos(off_flat))
 
 
 def test_revolved_surface_has_the_volume_of_the_round_one() -> None:

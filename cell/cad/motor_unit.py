@@ -59,6 +59,7 @@ PLATE_X, PLATE_Y_LOW, PLATE_Y_HIGH, PLATE_THICKNESS = 35.0, -33.0, 27.0, 5.0
 FOOT_THICKNESS, FOOT_BOTTOM = 5.0, -15.0
 FOOT_HOLE_RADIUS, FOOT_HOLE_X, FOOT_HOLE_Z = 2.25, 29.0, -10.0
 BOLT_HOLE_RADIUS = 1.7
+BOLT_HOLE_EDGE = 0.2  # [A] broken by deburring; contact begins outside of it.
 WASHER_RADIUS = 3.4  # [D] of what carries the clamp; at 3.5 it would fill the bore's chamfer.
 ALUMINIUM = 2700.0  # kg/m3; the material is not in the files [A].
 
@@ -102,7 +103,7 @@ def lumped_head_friction() -> float:
     K d = P / (2 pi) + mu r_eff, with r_eff = 2/3 (ro^3 - ri^3) / (ro^2 - ri^2) of the annulus
     that the head bears on: the thread itself is simulated frictionless.
     """
-    ro, ri = BEARING_RADIUS, BOLT_HOLE_RADIUS
+    ro, ri = BEARING_RADIUS, BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE
     r_eff = 2.0 / 3.0 * (ro**3 - ri**3) / (ro**2 - ri**2)
     return (NUT_FACTOR * 2.0 * THREAD_RADIUS - THREAD_PITCH / (2.0 * np.pi)) / r_eff
 
@@ -237,14 +238,16 @@ def _washer(center: tuple[float, float]) -> trimesh.Trimesh:
     """Return what is felt around a bolt's hole [m]: under the head, on the seat, and the wall.
 
     The wall ends short of both faces: where they are pressed in by micrometres it would only cost.
+    Half a facet of phase keeps its corners inside the flats of the faces, whose edges would
+    otherwise cut into a leaning shank and lift it.
     """
-    top, gap = PLATE_THICKNESS, 0.1
-    head = [(BEARING_RADIUS, top), (BOLT_HOLE_RADIUS, top)]
-    wall = [(BOLT_HOLE_RADIUS, top - gap), (BOLT_HOLE_RADIUS, gap)]
-    seat = [(BOLT_HOLE_RADIUS, 0.0), (WASHER_RADIUS, 0.0)]
-    facets = (WASHER_FACETS, HOLE_FACETS, WASHER_FACETS)
-    bands = zip((head, wall, seat), facets, strict=True)
-    return trimesh.util.concatenate([open_band(_mm(line), n, center) for line, n in bands])
+    inner, top = BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE, PLATE_THICKNESS
+    head = [(BEARING_RADIUS, top), (inner, top)]
+    wall = [(BOLT_HOLE_RADIUS, top - BOLT_HOLE_EDGE), (BOLT_HOLE_RADIUS, BOLT_HOLE_EDGE)]
+    seat = [(inner, 0.0), (WASHER_RADIUS, 0.0)]
+    bands = [open_band(_mm(line), WASHER_FACETS, center) for line in (head, seat)]
+    bands.append(open_band(_mm(wall), HOLE_FACETS, center, phase=0.5))
+    return trimesh.util.concatenate(bands)
 
 
 # Of the ring's section only the chamfers and the bore itself: the rest can touch nothing.
@@ -280,7 +283,7 @@ def _plate_boxes() -> list[Piece]:
 def bolt_pieces() -> list[Piece]:
     """Return the bolt's contact pieces."""
     # As a convex solid its pressure grows evenly from its underside to its middle.
-    bearing = np.pi * (BEARING_RADIUS**2 - BOLT_HOLE_RADIUS**2) * MM**2
+    bearing = np.pi * (BEARING_RADIUS**2 - (BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE) ** 2) * MM**2
     head = Contact(lumped_head_friction(), HEAD_STIFFNESS * HEAD_HEIGHT / 2 * MM / bearing)
     crown = _mm([(HEAD_RADIUS, 0.0), (HEAD_RADIUS, HEAD_HEIGHT)])
     body = _mm([(THREAD_RADIUS - TIP_CHAMFER, -BOLT_LENGTH)])

@@ -91,13 +91,13 @@ def revolved_surface(
 
 
 def open_band(
-    profile: Sequence[tuple[float, float]], facets: int, center: Point = (0, 0)
+    profile: Sequence[tuple[float, float]], facets: int, center: Point = (0, 0), phase: float = 0.0
 ) -> trimesh.Trimesh:
     """Return the open surface that a line from one (mean radius, z) to the next sweeps [m].
 
     The arguments are those of `revolved_surface`; the surface faces right of the line.
     """
-    band = revolved_surface(profile, facets, center)
+    band = revolved_surface(profile, facets, center, phase)
     # The last edge of the closed profile leads back to its start.
     felt = np.tile(np.repeat(np.arange(len(profile)) < len(profile) - 1, facets), 2)
     band.update_faces(felt)
