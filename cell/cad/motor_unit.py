@@ -100,12 +100,24 @@ HEAD_STIFFNESS = 1e8  # N/m
 def lumped_head_friction() -> float:
     """Return the friction under the head that alone gives the nut factor K.
 
-    K d = P / (2 pi) + mu r_eff, with r_eff = 2/3 (ro^3 - ri^3) / (ro^2 - ri^2) of the annulus
-    that the head bears on: the thread itself is simulated frictionless.
+    K d = P / (2 pi) + mu r_eff, with the r_eff of the annulus that the head bears on: the thread
+    itself is simulated frictionless.
     """
-    ro, ri = BEARING_RADIUS, BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE
-    r_eff = 2.0 / 3.0 * (ro**3 - ri**3) / (ro**2 - ri**2)
+    r_eff = friction_radius(BEARING_RADIUS, BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE, WASHER_FACETS)
     return (NUT_FACTOR * 2.0 * THREAD_RADIUS - THREAD_PITCH / (2.0 * np.pi)) / r_eff
+
+
+def friction_radius(outer: float, inner: float, facets: int) -> float:
+    """Return the mean distance from the axis over a ring of two polygons of given mean radii.
+
+    [D] Over a polygon with apothem a and half angle h of a facet the integral of r is
+    n a^3 / 3 (sec h tan h + arsinh tan h), and the area n a^2 tan h; 2/3 of the radius for many
+    facets.
+    """
+    half = np.pi / facets
+    apothem = vertex_radius(1.0, facets) * np.cos(half)
+    share = apothem / 3.0 * (1.0 / np.cos(half) + np.arcsinh(np.tan(half)) / np.tan(half))
+    return share * (outer**3 - inner**3) / (outer**2 - inner**2)
 
 
 def bolt_xy() -> list[tuple[float, float]]:
