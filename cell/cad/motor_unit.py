@@ -26,6 +26,7 @@ from cell.cad.shapes import (
     convex_revolve,
     cylinder,
     hexagon_prism,
+    joined,
     open_band,
     revolved_surface,
     shank,
@@ -79,6 +80,9 @@ BORE_FACETS = 64  # Sagitta 7 micrometres against 75 of clearance.
 
 # Contact [D]: softer metal lets a misplaced boss squeeze into the hole at tens of newtons.
 METAL_MODULUS = 1e10  # Pa
+# Metal comes off metal at no more than 1/d = 2 mm/s [A]: less than gravity adds in a step of 1 ms.
+# With the 10 s/m of softer things a part on its stiff seat is thrown back for ever [M].
+METAL_DISSIPATION = 500.0  # s/m
 FIT_FRICTION = 0.2  # [A] steel on aluminium, dry.
 NUT_FACTOR = 0.202  # [D] K of T = K d F for mu = 0.14 in thread and under the head.
 
@@ -186,7 +190,7 @@ def motor_pieces() -> list[Piece]:
     Rear boss and terminals have none: they sink into the membrane, which the bed's own surface
     samples see, and nothing else ever reaches them.
     """
-    metal = Contact(FIT_FRICTION, METAL_MODULUS)
+    metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
     nose = convex_revolve(
         _mm([(BOSS_RADIUS, -1.0), (BOSS_RADIUS, BOSS_END - EDGE_BREAK)])
         + _mm([(BOSS_RADIUS - EDGE_BREAK, BOSS_END)]),
@@ -259,7 +263,7 @@ def _washer(center: tuple[float, float]) -> trimesh.Trimesh:
     seat = [(inner, 0.0), (WASHER_RADIUS, 0.0)]
     bands = [open_band(_mm(line), WASHER_FACETS, center) for line in (head, seat)]
     bands.append(open_band(_mm(wall), HOLE_FACETS, center, phase=0.5))
-    return trimesh.util.concatenate(bands)
+    return joined(bands)
 
 
 # Of the ring's section only the chamfers and the bore itself: the rest can touch nothing.
@@ -296,13 +300,15 @@ def bolt_pieces() -> list[Piece]:
     """Return the bolt's contact pieces."""
     # As a convex solid its pressure grows evenly from its underside to its middle.
     bearing = np.pi * (BEARING_RADIUS**2 - (BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE) ** 2) * MM**2
-    head = Contact(lumped_head_friction(), HEAD_STIFFNESS * HEAD_HEIGHT / 2 * MM / bearing)
+    modulus = HEAD_STIFFNESS * HEAD_HEIGHT / 2 * MM / bearing
+    head = Contact(lumped_head_friction(), modulus, dissipation=METAL_DISSIPATION)
+    thread = Contact(FIT_FRICTION, 1e9, dissipation=METAL_DISSIPATION)
     crown = _mm([(HEAD_RADIUS, 0.0), (HEAD_RADIUS, HEAD_HEIGHT)])
     body = _mm([(THREAD_RADIUS - TIP_CHAMFER, -BOLT_LENGTH)])
     body += _mm([(THREAD_RADIUS, -BOLT_LENGTH + TIP_CHAMFER), (THREAD_RADIUS, 0.0)])
     return [
         Piece("head", convex_revolve(crown, HEAD_FACETS, phase=0.5), head, convex=True),
-        Piece("shank", convex_revolve(body, 8), Contact(FIT_FRICTION, 1e9), convex=True),
+        Piece("shank", convex_revolve(body, 8), thread, convex=True),
     ]
 
 

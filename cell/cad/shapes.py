@@ -104,6 +104,16 @@ def open_band(
     return band
 
 
+def joined(surfaces: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return several surfaces as one, without merging corners."""
+    first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces[:-1])])
+    return trimesh.Trimesh(
+        np.concatenate([surface.vertices for surface in surfaces]),
+        np.concatenate([s.faces + k for s, k in zip(surfaces, first, strict=True)]),
+        process=False,
+    )
+
+
 def _ring_faces(rings: int, facets: int) -> np.ndarray:
     """Return (2 * rings * facets, 3) indices that join each ring of vertices to the next."""
     ring, sector = np.meshgrid(np.arange(rings), np.arange(facets), indexing="ij")

@@ -155,6 +155,7 @@ def _insert(
             guard=lambda sensed: holding(sensed) or too_much_force(sensed),
             awake=awake,
             fine_log=True,
+            tare=name == "insert",
         )
 
     def height(sensed: Sensed) -> np.ndarray:
