@@ -13,12 +13,20 @@ from scipy.spatial.transform import Rotation
 
 from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import TetMesh
-from cell.soft_jig.contact_mesh import bed_mesh, conforming_cells, imprint_mesh, outline
+from cell.soft_jig.contact_mesh import (
+    FOOT_GAP,
+    bed_mesh,
+    conforming_cells,
+    imprint_mesh,
+    outline,
+)
 from cell.soft_jig.parameters import JigParameters
 from cell.soft_jig.polygons import area, clip, lower_facets, subtract
 from cell.soft_jig.samples import SurfaceSamples
 
 PARAMS = JigParameters()
+# How far the rim of a wall reaches into the part.
+RIM_SQUEEZE = 2 * abs(PARAMS.jammed.squeeze) + FOOT_GAP
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
@@ -98,9 +106,9 @@ def test_imprint_has_positive_tetrahedra_and_a_closed_surface(imprint) -> None:
 
 
 def test_imprint_leaves_room_for_the_part(imprint) -> None:
-    """Nothing reaches into the part but the squeeze of the walls, and 0.25 mm at the foot's end."""
+    """Nothing reaches into the part but the squeeze at the rim, and 0.25 mm at the foot's end."""
     _, hulls, mesh = imprint
-    assert overlap(mesh, hulls) < abs(PARAMS.jammed.squeeze) + 0.25e-3
+    assert overlap(mesh, hulls) < RIM_SQUEEZE + 0.25e-3
 
 
 def test_imprint_is_as_large_as_the_bed(imprint) -> None:
@@ -115,21 +123,34 @@ def test_imprint_is_small_enough_to_simulate(imprint) -> None:
 
 
 def test_floor_shares_the_facets_of_a_standing_part() -> None:
-    """The floor of a standing prism is its own bottom polygon, drawn in by the squeeze."""
+    """The floor of a standing prism is its own bottom polygon with the gap at its foot."""
     bed, hulls = pressed(MOTOR, [0, 0, 0])
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
     bottom = hulls[0][:, 2].min()
     top = np.abs(mesh.vertices[:, 2] - bottom) < 1e-9
     rim = np.hypot(*mesh.vertices[top, :2].T)
-    apothem_shift = abs(PARAMS.jammed.squeeze) / np.cos(np.pi / 24)
-    assert np.sum(np.abs(rim - (0.0175 - apothem_shift)) < 1e-8) == 24
+    assert np.sum(np.abs(rim - (0.0175 + FOOT_GAP / np.cos(np.pi / 24))) < 1e-8) == 24
+
+
+def test_wall_closes_on_the_part_by_the_squeeze() -> None:
+    """Half way up, between the gap at its foot and the rim, the wall is squeezed by its mean."""
+    bed, hulls = pressed(MOTOR, [0, 0, 0])
+    mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
+    inner = np.hypot(*mesh.vertices[:, :2].T) < 0.0178
+    rim = inner & (mesh.vertices[:, 2] > hulls[0][:, 2].min() + 2e-3)
+    radius = np.hypot(*mesh.vertices[rim, :2].T) * np.cos(np.pi / 24)
+    apothem = 0.0175 * np.cos(np.pi / 24)
+    assert np.sum(rim) >= 24
+    assert (radius.mean() + apothem + FOOT_GAP) / 2 == pytest.approx(
+        apothem + PARAMS.jammed.squeeze, abs=1e-6
+    )
 
 
 def test_wall_of_a_leaning_part_leans_with_it() -> None:
-    """At 1 deg the walls stay parallel to the part: no more overlap than the squeeze."""
+    """At 1 deg the walls stay parallel to the part: no more overlap than the squeeze at the rim."""
     bed, hulls = pressed(MOTOR, [1, 0, 0], 10.0)
     lean = np.array([0.0, -np.tan(np.radians(1))])
-    assert overlap(imprint_mesh(bed, PARAMS.jammed, hulls, lean), hulls) < 0.08e-3
+    assert overlap(imprint_mesh(bed, PARAMS.jammed, hulls, lean), hulls) < RIM_SQUEEZE + 0.03e-3
 
 
 def test_plate_in_pieces_around_a_hole_gives_one_floor() -> None:

@@ -232,14 +232,19 @@ class Bed:
         self.stretch = soil.initial_stretch * np.sqrt(slope[self.active].sum() / self._rest_area)
         self.tension = soil.membrane_modulus * (1 - self.stretch**-6)  # Neo-Hookean sheet [N/m].
         curvature = np.gradient(dx / slope, cell, axis=0) + np.gradient(dy / slope, cell, axis=1)
-        confinement = 2 * self.tension / self.bag.cap_radius + soil.gravity_pressure + self.vacuum
-        cohesion = confinement * np.tan(soil.friction_angle)
+        cohesion = self.confinement * np.tan(soil.friction_angle)
         depth = np.maximum(self._dome - self.heights, 0.0)
         self.yield_pressure = (
             cohesion * soil.cohesion_factor
             + soil.bead_weight * soil.overburden_factor * depth
             + self.tension * np.maximum(curvature, 0.0)
         )
+
+    @property
+    def confinement(self) -> float:
+        """Pressure that holds the beads together: membrane, their own weight and vacuum [Pa]."""
+        membrane = 2 * self.tension / self.bag.cap_radius
+        return float(membrane + self.soil.gravity_pressure + self.vacuum)
 
     # Freezing.
 

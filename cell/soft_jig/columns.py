@@ -22,8 +22,10 @@ Triangle = tuple[int, int, int]
 
 # Heights closer than this are the same node [m].
 SAME_HEIGHT = 2e-5
-# How far the center of a triangle fan is moved from the middle towards its first corner.
-FAN_SHIFT = 0.3
+# From this many corners on, a face is round and gets a triangle in its middle.
+MANY = 16
+# Size of the triangle in the middle of a many-sided face, relative to the face.
+CORE = 0.4
 
 
 class BadMesh(CellError):
@@ -98,8 +100,8 @@ class ColumnMesh:
 
     Attributes:
         plane: (n, 2) plane vertices.
-        lean: (2,) horizontal shift per height above a vertex's lowest top: walls of a part that
-            stands a little askew are parallel to it.
+        lean: (2,), or (n, 2) per plane vertex: horizontal shift per height above the vertex's
+            lowest top. Walls of a part that stands a little askew are parallel to it.
     """
 
     plane: Array
@@ -126,10 +128,11 @@ class ColumnMesh:
                 heights[corner].append(float(top))
         self._nodes: list[Array] = []
         self._levels: list[tuple[list[float], list[int]]] = []
-        for xy, values in zip(self.plane, heights, strict=True):
+        lean = np.broadcast_to(self.lean, self.plane.shape)
+        for xy, shift, values in zip(self.plane, lean, heights, strict=True):
             merged = _merge(sorted(values))
             foot = merged[min(1, len(merged) - 1)]
-            ids = [self._add([*(xy + self.lean * max(z - foot, 0.0)), z]) for z in merged]
+            ids = [self._add([*(xy + shift * max(z - foot, 0.0)), z]) for z in merged]
             self._levels.append((merged, ids))
 
     def _add(self, point: Array | list[float]) -> int:
@@ -169,11 +172,14 @@ class ColumnMesh:
             return [(ring[0], ring[1], ring[2])]
         if len(ring) == 4:
             return [(ring[0], ring[1], ring[2]), (ring[0], ring[2], ring[3])]
-        middle = np.array([*np.mean([self._nodes[i][:2] for i in ring], axis=0), center_height])
-        # Drake triangulates a part's faces around their middle. Two fans with one center would
-        # overlap in every pair of triangles there, so this one has its center elsewhere.
-        center = self._add(middle + FAN_SHIFT * (self._nodes[ring[0]] - middle))
-        return [(a, b, center) for a, b in _cyclic(ring)]
+        corners = np.array([self._nodes[i] for i in ring])
+        if len(ring) < MANY:
+            center = self._add([*_off_center(corners), center_height])
+            return [(a, b, center) for a, b in _cyclic(ring)]
+        middle = np.array([*corners[:, :2].mean(axis=0), center_height])
+        slope = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - corners[:, 2].mean())[0]
+        inner = [self._add(point) for point in _core(corners, middle, slope)]
+        return _annulus(ring, inner) + [(inner[0], inner[1], inner[2])]
 
     def _side(
         self, column: Column, a: int, b: int, edges: dict[tuple[int, int], list[tuple[int, int]]]
@@ -206,6 +212,34 @@ class ColumnMesh:
             faces.append((id_low[i], id_high[j], third))
             i, j = (i + 1, j) if step_low else (i, j + 1)
         return faces
+
+
+def _off_center(corners: Array) -> Array:
+    """Return the center (2,) of a fan: not the middle, where Drake puts the part's fan."""
+    return 0.7 * corners[:, :2].mean(axis=0) + 0.3 * corners[0, :2]
+
+
+def _core(corners: Array, middle: Array, slope: Array) -> Array:
+    """Return a triangle (3, 3) in the middle of a face.
+
+    Drake triangulates a part's faces around their middle. With a fan of its own there, the bed
+    would cut every one of the part's triangles many times; one triangle cuts each of them once.
+    """
+    xy = CORE * (corners[[0, len(corners) // 3, 2 * len(corners) // 3], :2] - middle[:2])
+    return np.column_stack([xy + middle[:2], xy @ slope + middle[2]])
+
+
+def _annulus(ring: list[int], inner: list[int]) -> list[Triangle]:
+    """Triangulate between a ring and the triangle in its middle; both start at the same angle."""
+    n = len(ring)
+    owner = [inner[int(3 * (k + 0.5) / n + 0.5) % 3] for k in range(n)]
+    faces: list[Triangle] = []
+    for k, (a, b) in enumerate(_cyclic(ring)):
+        before = owner[k - 1]
+        if before != owner[k]:
+            faces.append((a, owner[k], before))
+        faces.append((a, b, owner[k]))
+    return faces
 
 
 def _cyclic(ring: list[int]) -> list[tuple[int, int]]:

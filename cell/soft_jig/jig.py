@@ -8,7 +8,7 @@ the Context, between steps; nothing here needs a new diagram.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
 from typing import Any
@@ -36,6 +36,7 @@ from cell.soft_jig.drake_values import (
 from cell.soft_jig.parameters import JigParameters
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.visual import membrane_shape
+from cell.soft_jig.yielding import Patch, Strength, YieldMonitor, bed_contacts, returned
 
 Array = NDArray[np.float64]
 
@@ -89,6 +90,7 @@ class SoftJig:
         self._pressing: dict[str, tuple[RigidBody, SurfaceSamples]] = {}
         self._forces: list[ExternallyAppliedSpatialForce] = []
         self._since_drawn = 0.0
+        self._monitor = YieldMonitor()
 
     @staticmethod
     def add(
@@ -179,6 +181,7 @@ class SoftJig:
         self.bed.vacuum = self.pressure
         self._forces = []
         if self.state is JigState.JAMMED:
+            self._hold(root_context, dt)
             return
         self._press(root_context, dt)
         if self._pumping and self.pressure >= vacuum.jam_fraction * vacuum.pressure:
@@ -227,6 +230,51 @@ class SoftJig:
             applied_force(self._base, X_WB.inverse() @ p_WP, -F_W),
         ]
 
+    # Frozen: yield.
+
+    def _hold(self, root_context: Context, dt: float) -> None:
+        """Keep contact pressures within the beads' strength (`cell.soft_jig.yielding`)."""
+        if not np.isfinite(self.params.jammed.strength):
+            return
+        context = self._plant.GetMyContextFromRoot(root_context)
+        X_WJ = self.pose(context)
+        patches = []
+        for body, patch in self._yielding_patches(context, X_WJ):
+            X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
+            force, torque = patch.relief(X_JP.translation())
+            self._forces += self._pair(context, X_WJ, body, force, torque)
+            patches.append(patch)
+        self._return(root_context, patches, dt)
+
+    def _yielding_patches(
+        self, context: Context, X_WJ: RigidTransform
+    ) -> Iterator[tuple[RigidBody, Patch]]:
+        jammed = self.params.jammed
+        inspector, X_JW = self._scene_graph.model_inspector(), X_WJ.inverse()
+        strength = Strength.of(self.params.soil, jammed.strength * self.bed.confinement)
+        for body, surface in bed_contacts(self._plant, context, inspector, self._bed_id):
+            name = body.scoped_name().get_full()
+            X_JP = X_JW @ self._plant.EvalBodyPoseInWorld(context, body)
+            if self._monitor.may_yield(name, X_JP, jammed.pressure_gradient):
+                patch = Patch.of(surface, self._bed_id, X_JW, strength)
+                self._monitor.look(name, X_JP, patch, strength)
+                if patch.margin < 0:
+                    yield body, patch
+
+    def _return(self, root_context: Context, patches: list[Patch], dt: float) -> None:
+        """Move the surface for good where it gives way by a depth that matters."""
+        jammed, monitor = self.params.jammed, self._monitor
+        monitor.since_return += dt
+        deepest = max((patch.excess_depth.max() for patch in patches), default=0.0)
+        if deepest < jammed.return_depth or monitor.since_return < jammed.return_period - dt / 2:
+            return
+        mesh = returned(self._mesh, patches, jammed.return_depth / 2)
+        monitor.since_return = 0.0
+        if mesh is not None:
+            self._mesh = mesh
+            self._forces = []
+            self._install(root_context)
+
     # Freezing and drawing.
 
     def _jam(self, root_context: Context) -> None:
@@ -255,6 +303,7 @@ class SoftJig:
         jammed = self.params.jammed
         frozen = self.state is JigState.JAMMED
         gradient = jammed.pressure_gradient if frozen else jammed.soft_gradient
+        self._monitor.forget()
         properties = drake_proximity(self._mesh, self.params, gradient)
         with self.filters_lifted(root_context):
             # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
@@ -322,6 +371,7 @@ class SoftJig:
             "pressure": self.pressure,
             "pumping": self._pumping,
             "since_drawn": self._since_drawn,
+            "since_return": self._monitor.since_return,
             "vertices": self._mesh.vertices.copy(),
             "tetrahedra": self._mesh.tetrahedra.copy(),
             "forces": np.array([force_row(force) for force in self._forces]).reshape(-1, 10),
@@ -336,6 +386,8 @@ class SoftJig:
         self._mesh = TetMesh(state["vertices"].copy(), state["tetrahedra"].copy())
         self._install(root_context)
         self._since_drawn = float(state["since_drawn"])
+        self._monitor = YieldMonitor()
+        self._monitor.since_return = float(state["since_return"])
         self._forces = [self._from_row(row) for row in state["forces"]]
 
     def _from_row(self, row: Array) -> ExternallyAppliedSpatialForce:

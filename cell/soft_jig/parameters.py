@@ -123,6 +123,11 @@ class JammedParameters:
         layer: Depth of the pressure field's interior vertices [m]. [A] 5 mm.
         ring: Radial width of the ring of cells around the part [m]. [A] 10 mm, twice `layer`.
         edge: Longest edge along the outline [m]. [A] 12 mm.
+        strength: Factor on the beads' strength while frozen; infinity never yields. [A] 1; the
+            formulas for smooth walls and floors are conservative, DEM walls are weaker.
+        return_depth: Excess depth at which the surface is moved for good [m]. [A] numerical: until
+            then friction is too strong by what it carries, 19 % of the lateral strength.
+        return_period: Least time between two such moves [s]. [A] numerical.
     """
 
     pressure_gradient: float = 2.5e8
@@ -133,6 +138,9 @@ class JammedParameters:
     layer: float = 0.005
     ring: float = 0.010
     edge: float = 0.012
+    strength: float = 1.0
+    return_depth: float = 0.1e-3
+    return_period: float = 0.005
 
 
 @dataclass(frozen=True)
