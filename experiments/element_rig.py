@@ -230,15 +230,15 @@ class ElementRig:
         self._set_height(0.3, 0.0)
         self.step(round(0.5 / self.time_step))
 
-    def drag(
-        self, p_PQ: Array, direction: Array, way: float = 0.006, speed: float = 0.01
-    ) -> Drag:
+    def drag(self, p_PQ: Array, direction: Array, way: float = 0.006, speed: float = 0.01) -> Drag:
         """Drag point Q of the part along a direction of J [m]; the target moves at `speed`."""
         p_JQ0, R_JP0 = self.X_JP @ p_PQ, self.X_JP.rotation()
         rows = []
         while (target := speed * self.time_step * len(rows)) < way:
             moved = float(direction @ (self.X_JP @ p_PQ - p_JQ0))
-            force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (speed - self._rate(p_PQ, direction))
+            force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (
+                speed - self._rate(p_PQ, direction)
+            )
             self._pull = [self._force_at(p_PQ, max(force, 0.0) * direction)]
             self.step()
             turn = (R_JP0.inverse() @ self.X_JP.rotation()).ToAngleAxis().angle()

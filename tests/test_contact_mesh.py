@@ -16,11 +16,10 @@ from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.contact_mesh import (
     FOOT_GAP,
     bed_mesh,
-    conforming_cells,
     imprint_mesh,
-    outline,
 )
 from cell.soft_jig.parameters import JigParameters
+from cell.soft_jig.plane_cells import conforming_cells, outline
 from cell.soft_jig.polygons import area, clip, lower_facets, subtract
 from cell.soft_jig.samples import SurfaceSamples
 

@@ -7,6 +7,7 @@ from cell.soft_jig.parameters import (
     JammedParameters,
     JigParameters,
     SoilParameters,
+    SuctionParameters,
     VacuumParameters,
 )
 from cell.soft_jig.samples import SurfaceSamples
@@ -19,6 +20,7 @@ __all__ = [
     "JigState",
     "SoftJig",
     "SoilParameters",
+    "SuctionParameters",
     "SurfaceSamples",
     "VacuumParameters",
 ]

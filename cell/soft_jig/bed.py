@@ -197,6 +197,12 @@ class Bed:
         self.absorbed += taken
         self.displaced -= taken
 
+    def underside_over_bed(self, name: str) -> Array:
+        """Return the height (n, n) of a part's underside in the latest step; infinite elsewhere."""
+        height = np.full(self.heights.size, np.inf)
+        np.minimum.at(height, *self._ceilings.get(name, (np.zeros(0, dtype=np.int64), np.zeros(0))))
+        return height.reshape(self.heights.shape)
+
     def _ceiling(self) -> Array:
         ceiling = np.full(self.heights.size, np.inf)
         for flat, z in self._ceilings.values():
@@ -262,6 +268,19 @@ class Bed:
         self._shrinkage = np.where(held, 0.0, contraction * self.heights)
         self.heights = self.heights - self._shrinkage
         self._traction[:] = 0.0
+
+    def conform(self, X_JP: tuple[Array, Array], samples: SurfaceSamples) -> None:
+        """Lower the surface to a part that has pushed the frozen bed aside.
+
+        Args:
+            X_JP: Rotation matrix and position of the part.
+            samples: Its surface.
+        """
+        _, z, _, cells = self._points_over_bed(X_JP, samples)
+        heights = self.heights.reshape(-1)
+        before = heights.sum()
+        np.minimum.at(heights, cells, np.maximum(z, self.bag.floor))
+        self.displaced += float(before - heights.sum()) * self.bag.cell**2
 
     def unjam(self) -> None:
         """Let air in again: the shrinkage goes back, the imprint stays."""

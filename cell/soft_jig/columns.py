@@ -177,7 +177,9 @@ class ColumnMesh:
             center = self._add([*_off_center(corners), center_height])
             return [(a, b, center) for a, b in _cyclic(ring)]
         middle = np.array([*corners[:, :2].mean(axis=0), center_height])
-        slope = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - corners[:, 2].mean())[0]
+        slope = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - corners[:, 2].mean())[
+            0
+        ]
         inner = [self._add(point) for point in _core(corners, middle, slope)]
         return _annulus(ring, inner) + [(inner[0], inner[1], inner[2])]
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cell.soft_jig.bed import Bed
-from cell.soft_jig.columns import SAME_HEIGHT, BadMesh, Column, ColumnMesh, TetMesh
+from cell.soft_jig.columns import SAME_HEIGHT, Column, ColumnMesh, TetMesh
 from cell.soft_jig.parameters import JammedParameters
+from cell.soft_jig.plane_cells import cell_edges, conforming_cells, outline
 from cell.soft_jig.polygons import (
-    WELD,
     Facet,
     area,
     clip,
@@ -25,6 +25,7 @@ from cell.soft_jig.polygons import (
     convex_hull,
     edge_normals,
     lower_facets,
+    offset_loop,
     subtract,
 )
 
@@ -77,6 +78,7 @@ def imprint_mesh(
     facets = _touching_facets(bed, undersides)
     plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
     loop = outline(cells)
+    plane[loop] = offset_loop(plane[loop], params.squeeze)
     tops = [facet.height(plane[cell]) for facet, cell in zip(facets, cells, strict=True)]
     floor = [
         _floor_column(cell, plane, top, float(top.mean()), params)
@@ -93,9 +95,9 @@ def _edge_feet(floor: Sequence[Column], loop: Sequence[int]) -> Array:
     height = {
         edge: (column.tops[k], column.tops[(k + 1) % len(column.tops)])
         for column in floor
-        for k, edge in enumerate(_edges(column.corners))
+        for k, edge in enumerate(cell_edges(column.corners))
     }
-    return np.array([height[edge] for edge in _edges(list(loop))])
+    return np.array([height[edge] for edge in cell_edges(list(loop))])
 
 
 # Where the part touches.
@@ -318,13 +320,14 @@ def _wall_heights(floor: Sequence[Column], loop: list[int], rim: Array) -> Array
 
 
 def _closing(wall: Array, params: JammedParameters) -> tuple[Array, Array]:
-    """Return the outward shift of the wall's foot and its slope (n,); its mean is the squeeze.
+    """Return how far to shift the wall's foot outwards and its slope (n,); the mean stays.
 
-    A wall that is low somewhere, or not around one flat floor, is offset as a whole.
+    A wall that is low somewhere, or not around one flat floor, keeps its offset as a whole.
     """
     if wall.min() < LEAST_WALL:
-        return np.full(len(wall), params.squeeze), np.zeros(len(wall))
-    return np.full(len(wall), FOOT_GAP), 2 * (params.squeeze - FOOT_GAP) / wall
+        return np.zeros(len(wall)), np.zeros(len(wall))
+    shift = FOOT_GAP - params.squeeze
+    return np.full(len(wall), shift), -2 * shift / wall
 
 
 def _ring_column(
@@ -350,79 +353,3 @@ def _plane_height(
 def _distance_to_circle(xy: Array, direction: Array, radius: float) -> Array:
     along = np.einsum("ij,ij->i", xy, direction)
     return -along + np.sqrt(along**2 + radius**2 - np.einsum("ij,ij->i", xy, xy))
-
-
-# Plane topology.
-
-
-def conforming_cells(polygons: Sequence[Array], longest: float) -> tuple[Array, list[list[int]]]:
-    """Weld polygons into cells that share whole edges, outer edges split to `longest` [m]."""
-    points: list[Array] = []
-    cells = [[_weld(points, xy) for xy in polygon] for polygon in polygons]
-    cells = [_with_hanging_vertices(cell, points) for cell in cells]
-    shared = {edge for cell in cells for edge in _edges(cell)}
-    split = [_split_outer_edges(cell, points, shared, longest) for cell in cells]
-    return np.array(points), split
-
-
-def _weld(points: list[Array], xy: Array) -> int:
-    for i, known in enumerate(points):
-        if np.abs(known - xy).max() < 10 * WELD:
-            return i
-    points.append(np.asarray(xy, dtype=float))
-    return len(points) - 1
-
-
-def _edges(cell: list[int]) -> list[tuple[int, int]]:
-    return list(zip(cell, [*cell[1:], cell[0]], strict=True))
-
-
-def _with_hanging_vertices(cell: list[int], points: list[Array]) -> list[int]:
-    """Insert the vertices of other cells that lie on this cell's edges."""
-    cell = list(dict.fromkeys(cell))
-    full = []
-    for a, b in _edges(cell):
-        edge = points[b] - points[a]
-        length = float(np.linalg.norm(edge))
-        offset = np.array(points) - points[a]
-        along = offset @ edge / length
-        beside = np.abs(offset @ np.array([-edge[1], edge[0]])) / length
-        on = np.flatnonzero((beside < 10 * WELD) & (along > WELD) & (along < length - WELD))
-        full += [a, *(int(i) for i in on[np.argsort(along[on])] if i not in (a, b))]
-    return full
-
-
-def _split_outer_edges(
-    cell: list[int], points: list[Array], shared: set[tuple[int, int]], longest: float
-) -> list[int]:
-    full = []
-    for a, b in _edges(cell):
-        full.append(a)
-        if (b, a) not in shared:
-            pieces = int(np.ceil(np.linalg.norm(points[b] - points[a]) / longest))
-            for k in range(1, pieces):
-                points.append(points[a] + (points[b] - points[a]) * k / pieces)
-                full.append(len(points) - 1)
-    return full
-
-
-def outline(cells: Sequence[list[int]]) -> list[int]:
-    """Return the counter-clockwise loop of vertices around all cells."""
-    edges = {edge for cell in cells for edge in _edges(cell)}
-    following = {a: b for a, b in edges if (b, a) not in edges}
-    loop = [min(following)]
-    while following[loop[-1]] != loop[0]:
-        loop.append(following[loop[-1]])
-        if len(loop) > len(following):
-            break
-    if len(loop) != len(following):
-        raise BadMesh("The part touches the bed in separate patches; the jig meshes one outline.")
-    return loop
-
-
-def offset_loop(polygon: Array, distance: float) -> Array:
-    """Return the loop with every edge moved outwards by `distance` (inwards if negative)."""
-    normal, _ = edge_normals(polygon)
-    before = np.roll(normal, 1, axis=0)
-    both = normal + before
-    return polygon + distance * both / (1 + np.einsum("ij,ij->i", normal, before))[:, None]

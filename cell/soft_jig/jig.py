@@ -8,7 +8,7 @@ the Context, between steps; nothing here needs a new diagram.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
 from typing import Any
@@ -33,10 +33,11 @@ from cell.soft_jig.drake_values import (
     hull_vertices,
     lean_of,
 )
+from cell.soft_jig.holding import Holding
 from cell.soft_jig.parameters import JigParameters
 from cell.soft_jig.samples import SurfaceSamples
+from cell.soft_jig.suction import Seal, SealedPatch
 from cell.soft_jig.visual import membrane_shape
-from cell.soft_jig.yielding import Patch, Strength, YieldMonitor, bed_contacts, returned
 
 Array = NDArray[np.float64]
 
@@ -90,7 +91,7 @@ class SoftJig:
         self._pressing: dict[str, tuple[RigidBody, SurfaceSamples]] = {}
         self._forces: list[ExternallyAppliedSpatialForce] = []
         self._since_drawn = 0.0
-        self._monitor = YieldMonitor()
+        self._holding = Holding(plant, scene_graph, self._bed_id, params)
 
     @staticmethod
     def add(
@@ -137,6 +138,10 @@ class SoftJig:
         """Let air in (or out, after inflating): the bag is soft and keeps its imprint."""
         self._pumping = False
         if self.state is JigState.JAMMED:
+            context = self._plant.GetMyContextFromRoot(root_context)
+            X_WJ = self.pose(context)
+            for body, samples in self._pressing.values():
+                self.bed.conform(self._motion_in_jig(context, X_WJ, body)[0], samples)
             self.bed.unjam()
             self.state = JigState.SOFT
             self._show_bed(root_context)
@@ -160,6 +165,11 @@ class SoftJig:
     def pressing(self) -> tuple[RigidBody, ...]:
         """The bodies that the soft bed carries."""
         return tuple(body for body, _ in self._pressing.values())
+
+    @property
+    def sealed_patches(self) -> dict[str, list[SealedPatch]]:
+        """The flat contacts of each held body with their sealed fraction; empty unless jammed."""
+        return {name: list(seal.patches) for name, seal in self._holding.seals.items()}
 
     # Simulation.
 
@@ -230,58 +240,29 @@ class SoftJig:
             applied_force(self._base, X_WB.inverse() @ p_WP, -F_W),
         ]
 
-    # Frozen: yield.
-
     def _hold(self, root_context: Context, dt: float) -> None:
-        """Keep contact pressures within the beads' strength (`cell.soft_jig.yielding`)."""
-        if not np.isfinite(self.params.jammed.strength):
-            return
+        """Add to the elastic contact what suction pulls and what the beads cannot carry."""
         context = self._plant.GetMyContextFromRoot(root_context)
-        X_WJ = self.pose(context)
-        patches = []
-        for body, patch in self._yielding_patches(context, X_WJ):
-            X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
-            force, torque = patch.relief(X_JP.translation())
-            self._forces += self._pair(context, X_WJ, body, force, torque)
-            patches.append(patch)
-        self._return(root_context, patches, dt)
-
-    def _yielding_patches(
-        self, context: Context, X_WJ: RigidTransform
-    ) -> Iterator[tuple[RigidBody, Patch]]:
-        jammed = self.params.jammed
-        inspector, X_JW = self._scene_graph.model_inspector(), X_WJ.inverse()
-        strength = Strength.of(self.params.soil, jammed.strength * self.bed.confinement)
-        for body, surface in bed_contacts(self._plant, context, inspector, self._bed_id):
-            name = body.scoped_name().get_full()
-            X_JP = X_JW @ self._plant.EvalBodyPoseInWorld(context, body)
-            if self._monitor.may_yield(name, X_JP, jammed.pressure_gradient):
-                patch = Patch.of(surface, self._bed_id, X_JW, strength)
-                self._monitor.look(name, X_JP, patch, strength)
-                if patch.margin < 0:
-                    yield body, patch
-
-    def _return(self, root_context: Context, patches: list[Patch], dt: float) -> None:
-        """Move the surface for good where it gives way by a depth that matters."""
-        jammed, monitor = self.params.jammed, self._monitor
-        monitor.since_return += dt
-        deepest = max((patch.excess_depth.max() for patch in patches), default=0.0)
-        if deepest < jammed.return_depth or monitor.since_return < jammed.return_period - dt / 2:
-            return
-        mesh = returned(self._mesh, patches, jammed.return_depth / 2)
-        monitor.since_return = 0.0
+        X_WJ, holding = self.pose(context), self._holding
+        bodies = {name: body for name, (body, _) in self._pressing.items()}
+        for load in holding.pulls(context, X_WJ, bodies, self.pressure):
+            self._forces += self._pair(context, X_WJ, *load)
+        for load in holding.reliefs(context, X_WJ, self.bed.confinement):
+            self._forces += self._pair(context, X_WJ, *load)
+        mesh = holding.return_mesh(self._mesh, dt)
         if mesh is not None:
             self._mesh = mesh
-            self._forces = []
             self._install(root_context)
 
     # Freezing and drawing.
 
     def _jam(self, root_context: Context) -> None:
         context = self._plant.GetMyContextFromRoot(root_context)
+        X_WJ = self.pose(context)
+        for name in self._pressing:
+            self._holding.seals[name] = self._seal(context, X_WJ, name)
         self.bed.jam(self.params.vacuum.contraction)
         self.state = JigState.JAMMED
-        X_WJ = self.pose(context)
         hulls, lean = [], np.zeros(2)
         for body, _ in self._pressing.values():
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
@@ -291,8 +272,14 @@ class SoftJig:
         self._mesh = imprint_mesh(self.bed, self.params.jammed, hulls, lean)
         self._install(root_context)
 
+    def _seal(self, context: Context, X_WJ: RigidTransform, name: str) -> Seal:
+        body, samples = self._pressing[name]
+        X_JP, _ = self._motion_in_jig(context, X_WJ, body)
+        return Seal.under(self.bed, samples.name, X_JP, self.params.suction.lip)
+
     def _show_bed(self, root_context: Context) -> None:
         self._forces = []
+        self._holding.seals.clear()
         self._mesh = bed_mesh(self.bed, self.params.jammed)
         self._install(root_context)
 
@@ -303,7 +290,7 @@ class SoftJig:
         jammed = self.params.jammed
         frozen = self.state is JigState.JAMMED
         gradient = jammed.pressure_gradient if frozen else jammed.soft_gradient
-        self._monitor.forget()
+        self._holding.forget()
         properties = drake_proximity(self._mesh, self.params, gradient)
         with self.filters_lifted(root_context):
             # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
@@ -371,7 +358,7 @@ class SoftJig:
             "pressure": self.pressure,
             "pumping": self._pumping,
             "since_drawn": self._since_drawn,
-            "since_return": self._monitor.since_return,
+            "holding": self._holding.state(),
             "vertices": self._mesh.vertices.copy(),
             "tetrahedra": self._mesh.tetrahedra.copy(),
             "forces": np.array([force_row(force) for force in self._forces]).reshape(-1, 10),
@@ -386,8 +373,7 @@ class SoftJig:
         self._mesh = TetMesh(state["vertices"].copy(), state["tetrahedra"].copy())
         self._install(root_context)
         self._since_drawn = float(state["since_drawn"])
-        self._monitor = YieldMonitor()
-        self._monitor.since_return = float(state["since_return"])
+        self._holding.restore(state["holding"])
         self._forces = [self._from_row(row) for row in state["forces"]]
 
     def _from_row(self, row: Array) -> ExternallyAppliedSpatialForce:

@@ -8,6 +8,7 @@ run with glass beads in a dome of the same size.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import ClassVar
 
 import numpy as np
 
@@ -144,6 +145,36 @@ class JammedParameters:
 
 
 @dataclass(frozen=True)
+class SuctionParameters:
+    """Suction of the membrane on a part when the beads contract; wholly an assumption.
+
+    DEM with a perfect seal holds 8 to 50 times as much as with air under the part, and decides
+    whether a flat plate can be pushed. No source gives the seal of silicone on metal.
+
+    Attributes:
+        enabled: Switch: false shows every outcome with air under the part.
+        strength: Suction on closed contact at 90 kPa of vacuum [Pa]. [A] 4e3, range 0-90e3 (DEM
+            with a perfect seal); it goes with the vacuum.
+        reach: Opening at which the seal is lost [m]. [A] 1 mm, the membrane's thickness.
+        slip: Sliding at which the seal is lost [m]. [A] 3 mm, the width of the lip.
+        lip: Width of contact that seals against an edge, hole or pin [m]. [A] 3 mm.
+    """
+
+    enabled: bool = True
+    strength: float = 4.0e3
+    reach: float = 1.0e-3
+    slip: float = 3.0e-3
+    lip: float = 3.0e-3
+
+    # Vacuum at which `strength` is stated [Pa].
+    FULL_VACUUM: ClassVar[float] = 90e3
+
+    def pressure(self, vacuum: float) -> float:
+        """Return the suction on closed contact under a vacuum [Pa]."""
+        return self.strength * vacuum / self.FULL_VACUUM if self.enabled else 0.0
+
+
+@dataclass(frozen=True)
 class JigParameters:
     """All of the soft jig.
 
@@ -156,4 +187,5 @@ class JigParameters:
     soil: SoilParameters = field(default_factory=SoilParameters)
     vacuum: VacuumParameters = field(default_factory=VacuumParameters)
     jammed: JammedParameters = field(default_factory=JammedParameters)
+    suction: SuctionParameters = field(default_factory=SuctionParameters)
     visual_period: float = float("inf")

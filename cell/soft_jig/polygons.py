@@ -112,3 +112,11 @@ def area(polygon: Array) -> float:
     """Return the signed area (counter-clockwise is positive)."""
     x, y = polygon.T
     return float(0.5 * (x @ np.roll(y, -1) - y @ np.roll(x, -1)))
+
+
+def offset_loop(polygon: Array, distance: float) -> Array:
+    """Return the loop with every edge moved outwards by `distance` (inwards if negative)."""
+    normal, _ = edge_normals(polygon)
+    before = np.roll(normal, 1, axis=0)
+    both = normal + before
+    return polygon + distance * both / (1 + np.einsum("ij,ij->i", normal, before))[:, None]

@@ -16,16 +16,12 @@ nothing can yield.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import ContactSurface, GeometryId, SceneGraphInspector
+from pydrake.geometry import ContactSurface, GeometryId
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import RigidBody
-from pydrake.systems.framework import Context
 
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.parameters import SoilParameters
@@ -40,8 +36,6 @@ OUTSIDE = 0.05
 RIDGE = 0.02
 # Least volume that a tetrahedron may keep, relative to what it had.
 LEAST_VOLUME = 0.1
-# The pressure may grow faster with depth than its nominal gradient where the mesh is slanted.
-GRADIENT_MARGIN = 1.5
 
 
 @dataclass(frozen=True)
@@ -77,7 +71,7 @@ class Patch:
         normals: (n, 3) out of the bed, in J.
         areas: (n,) [m2].
         pressures: (n,) elastic contact pressure [Pa].
-        gradients: (n,) of the pressure against depth [Pa/m]; only where `limit` is exceeded, else 0.
+        gradients: (n,) of the pressure against depth [Pa/m], 0 where the limit is not exceeded.
         limits: (n,) pressure at which the beads yield [Pa].
     """
 
@@ -130,19 +124,6 @@ class Patch:
         """Return the force on the part (3,) [N] and its torque about P (3,) [N m], in J."""
         force = -(self.excess * self.areas)[:, None] * self.normals
         return force.sum(axis=0), np.cross(self.points - p_JP, force).sum(axis=0)
-
-
-def bed_contacts(
-    plant: MultibodyPlant, context: Context, inspector: SceneGraphInspector, bed: GeometryId
-) -> Iterator[tuple[RigidBody, ContactSurface]]:
-    """Yield what touched the bed in the plant's latest step."""
-    results = plant.get_contact_results_output_port().Eval(context)
-    for i in range(results.num_hydroelastic_contacts()):
-        surface = results.hydroelastic_contact_info(i).contact_surface()
-        first, second = surface.id_M(), surface.id_N()
-        if bed in (first, second):
-            other = second if first == bed else first
-            yield plant.GetBodyFromFrameId(inspector.GetFrameId(other)), surface
 
 
 # The plastic return.
@@ -226,39 +207,3 @@ def _owners(triangles: Array, patch: Patch) -> tuple[NDArray[np.int64], Array]:
     every = np.arange(len(owner))
     weights = np.stack([1 - u - v, u, v], axis=2)
     return np.where(fits[every, owner], owner, -1), weights[every, owner]
-
-
-class YieldMonitor:
-    """Looks closely at a contact only when its pressure can have reached the limit.
-
-    Attributes:
-        since_return: Time since the surface was last moved [s].
-    """
-
-    def __init__(self) -> None:
-        self.since_return = np.inf
-        self._seen: dict[str, tuple[RigidTransform, float, float]] = {}
-
-    def forget(self) -> None:
-        """Look at every contact anew: the surface has changed."""
-        self._seen.clear()
-
-    def may_yield(self, name: str, X_JP: RigidTransform, gradient: float) -> bool:
-        """Say whether a body has moved far enough since its last look to press too hard.
-
-        Args:
-            name: Of the body.
-            X_JP: Its pose now.
-            gradient: Of the elastic pressure against depth [Pa/m].
-        """
-        if name not in self._seen:
-            return True
-        X_JP0, reach, margin = self._seen[name]
-        turn = np.sqrt(max(3.0 - np.sum(X_JP0.rotation().matrix() * X_JP.rotation().matrix()), 0.0))
-        way = np.linalg.norm(X_JP.translation() - X_JP0.translation()) + turn * reach
-        return bool(GRADIENT_MARGIN * gradient * way >= margin)
-
-    def look(self, name: str, X_JP: RigidTransform, patch: Patch, strength: Strength) -> None:
-        """Remember the pose and how much was missing to the limit."""
-        reach = np.linalg.norm(patch.points - X_JP.translation(), axis=1).max(initial=0.0)
-        self._seen[name] = (X_JP, float(reach), min(patch.margin, strength.lateral))

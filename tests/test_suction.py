@@ -1,0 +1,92 @@
+"""Suction: which cells seal, and how the seal pulls, opens and breaks."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from cell.soft_jig.parameters import SuctionParameters
+from cell.soft_jig.suction import Seal, sealed_cells
+
+CELL, LIP = 1.5e-3, 3e-3
+N = 41
+AXIS = (np.arange(N) - N // 2).astype(float) * CELL
+X, Y = np.meshgrid(AXIS, AXIS, indexing="ij")
+DISC = np.hypot(X, Y) < 0.0175
+PARAMS = SuctionParameters()
+
+
+def test_flat_disc_seals_but_for_its_lip() -> None:
+    """Sealed area pi (r - lip)^2 over pi r^2."""
+    sealed, (patch,) = sealed_cells(np.zeros((N, N)), DISC, CELL, LIP)
+    assert patch.seal == pytest.approx((1 - LIP / 0.0175) ** 2, rel=0.1)
+    assert patch.area == pytest.approx(np.pi * 0.0175**2, rel=0.05)
+    assert not sealed[~DISC].any()
+
+
+def test_tilted_face_seals_like_a_level_one() -> None:
+    level, _ = sealed_cells(np.zeros((N, N)), DISC, CELL, LIP)
+    tilted, _ = sealed_cells(0.3 * X, DISC, CELL, LIP)
+    assert np.array_equal(level, tilted)
+
+
+def test_hole_vents_a_lip_around_it() -> None:
+    """A 12 mm hole costs the seal a disc of 6 mm and the lip."""
+    hole = np.hypot(X, Y) < 0.006
+    sealed, _ = sealed_cells(np.zeros((N, N)), DISC & ~hole, CELL, LIP)
+    assert not sealed[np.hypot(X, Y) < 0.006 + LIP - CELL].any()
+    assert sealed.any()
+
+
+def test_pins_of_the_motor_vent_its_end() -> None:
+    """Two 6.3 mm terminals and a 3 mm boss leave less than a fifth of the face sealed."""
+    heights = np.zeros((N, N))
+    heights[np.hypot(X, Y) < 0.0039] = -0.003
+    for side in (-1, 1):
+        heights[np.hypot(X - side * 0.0092, Y + 0.00645) < 0.0016] = -0.0063
+    _, patches = sealed_cells(heights, DISC, CELL, LIP)
+    assert sum(patch.seal * patch.area for patch in patches) < 0.2 * np.pi * 0.0175**2
+
+
+def seal() -> Seal:
+    points = np.column_stack([X[DISC], Y[DISC], np.zeros(DISC.sum())])
+    n = len(points)
+    normals = np.tile([0.0, 0.0, 1.0], (n, 1))
+    return Seal(points.copy(), points.copy(), normals, np.full(n, CELL**2), np.ones(n), [])
+
+
+def at(x: float, z: float) -> tuple[np.ndarray, np.ndarray]:
+    return np.eye(3), np.array([x, 0.0, z])
+
+
+def test_closed_seal_pulls_with_strength_times_area() -> None:
+    force, torque = seal().pull(at(0, 0), 4e3, PARAMS)
+    assert force == pytest.approx([0, 0, -4e3 * DISC.sum() * CELL**2])
+    assert torque == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+@pytest.mark.parametrize("where", [(0.0, PARAMS.reach), (1.01 * PARAMS.slip, 0.0)])
+def test_seal_is_lost_at_its_reach_and_does_not_heal(where: tuple[float, float]) -> None:
+    """Opened or slid so far it does not pull, nor after coming back."""
+    opened = seal()
+    assert not opened.pull(at(*where), 4e3, PARAMS)[0].any()
+    assert not opened.pull(at(0, 0), 4e3, PARAMS)[0].any()
+
+
+def test_half_opened_seal_pulls_half() -> None:
+    whole = seal().pull(at(0, 0), 4e3, PARAMS)[0][2]
+    assert seal().pull(at(0, PARAMS.reach / 2), 4e3, PARAMS)[0][2] == pytest.approx(whole / 2)
+
+
+def test_saved_seal_pulls_the_same() -> None:
+    first = seal()
+    first.pull(at(0, 3e-4), 4e3, PARAMS)
+    again = Seal.from_arrays(first.arrays())
+    assert np.array_equal(
+        first.pull(at(0, 1e-4), 4e3, PARAMS), again.pull(at(0, 1e-4), 4e3, PARAMS)
+    )
+
+
+def test_suction_follows_the_vacuum_and_its_switch() -> None:
+    assert PARAMS.pressure(45e3) == pytest.approx(PARAMS.strength / 2)
+    assert SuctionParameters(enabled=False).pressure(90e3) == 0.0

@@ -1,0 +1,107 @@
+"""The frozen bed's strength: formulas, relief of excess pressure, and the plastic return."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from cell.soft_jig import JigParameters
+from cell.soft_jig.columns import TetMesh
+from cell.soft_jig.parameters import SoilParameters
+from cell.soft_jig.yielding import Patch, Strength, returned
+from experiments.element_rig import ElementRig, Prism
+
+UP = np.array([0.0, 0.0, 1.0])
+
+
+def block() -> TetMesh:
+    """Return a 20 mm cube of jammed beads on z = 0, as tetrahedra from its middle."""
+    corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (0, 2)]) * 0.01
+    quads = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]
+    faces = [t for a, b, c, d in quads for t in ((a, b, c), (a, c, d))]
+    tetrahedra = np.array([(a, b, c, 8) for a, b, c in faces])
+    vertices = np.vstack([corners, [[0.0, 0.0, 0.01]]])
+    mesh = TetMesh(vertices, tetrahedra)
+    flipped = mesh.volumes() < 0
+    tetrahedra[flipped] = tetrahedra[flipped][:, [0, 2, 1, 3]]
+    return TetMesh(vertices, tetrahedra)
+
+
+def patch_on_top(depth: float, excess: float, gradient: float = 2.5e8) -> Patch:
+    """Return polygons that lie this deep behind the block's top, over its limit by a pressure."""
+    side = np.linspace(-0.009, 0.009, 10)
+    x, y = (grid.ravel() for grid in np.meshgrid(side, side))
+    n = len(x)
+    points = np.column_stack([x, y, np.full(n, 0.02 - depth)])
+    limits = np.full(n, 1e5)
+    return Patch(
+        points,
+        np.tile(UP, (n, 1)),
+        np.full(n, 4e-6),
+        limits + excess,
+        np.full(n, gradient),
+        limits,
+    )
+
+
+def test_strength_is_the_formulas_of_soil_mechanics() -> None:
+    """90 kPa and 25 deg: 132 kPa against a wall, c Nc = 0.87 MPa under a floor [D]."""
+    strength = Strength.of(SoilParameters(), 90e3)
+    assert strength.lateral == pytest.approx(132e3, rel=0.005)
+    assert strength.bearing == pytest.approx(0.87e6, rel=0.005)
+    assert Strength.of(SoilParameters(), 45e3).lateral == pytest.approx(strength.lateral / 2)
+    wall_and_floor = strength.limit(np.array([[1.0, 0, 0], [0, 0, 1.0]]))
+    assert wall_and_floor == pytest.approx([strength.lateral, strength.bearing])
+
+
+def test_relief_is_the_excess_times_the_area_into_the_bed() -> None:
+    force, torque = patch_on_top(1e-3, 2e4).relief(np.array([0.0, 0.0, 0.02]))
+    assert force == pytest.approx([0, 0, -2e4 * 100 * 4e-6])
+    assert torque == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_within_the_limit_nothing_is_relieved() -> None:
+    force, _ = patch_on_top(1e-3, -1.0).relief(np.zeros(3))
+    assert not force.any()
+    assert returned(block(), [patch_on_top(1e-3, -1.0)], 1e-5) is None
+
+
+def test_surface_returns_by_the_excess_depth() -> None:
+    """A uniform excess of 50 kPa at 250 kPa/mm lowers the face by 0.2 mm, and only that face."""
+    mesh = block()
+    moved = returned(mesh, [patch_on_top(1e-3, 5e4)], 1e-5)
+    assert moved is not None
+    shift = moved.vertices - mesh.vertices
+    top = mesh.vertices[:, 2] > 0.015
+    assert shift[top, 2] == pytest.approx(-2e-4, rel=0.05)
+    assert np.abs(shift[~top]).max() < 1e-9
+    assert moved.volumes().min() > 0
+
+
+def test_mesh_that_would_fold_over_is_moved_less_or_not_at_all() -> None:
+    """Asked to sink by more than its height, the block keeps positive tetrahedra."""
+    moved = returned(block(), [patch_on_top(1e-3, 5e6)], 1e-5)
+    assert moved is None or moved.volumes().min() > 0
+
+
+@pytest.fixture(scope="module")
+def weak_wall() -> tuple[float, float]:
+    """Return what holds a cylinder 15 mm deep, low on its side: at full strength and at a tenth."""
+    forces = []
+    for strength in (1.0, 0.1):
+        params = JigParameters()
+        jammed = replace(params.jammed, strength=strength)
+        rig = ElementRig(replace(params, jammed=jammed), Prism(facets=12))
+        rig.lower_to(0.015, speed=0.04)
+        rig.jam()
+        rig.let_go()
+        forces.append(rig.drag(np.array([0, 0, 0.02]), np.array([1.0, 0, 0]), 0.004).holding_force)
+    return forces[0], forces[1]
+
+
+def test_walls_hold_no_more_than_their_strength(weak_wall: tuple[float, float]) -> None:
+    """In the plant: walls of a tenth of the strength hold far less, and not nothing."""
+    strong, weak = weak_wall
+    assert 0.5 < weak < 0.4 * strong
