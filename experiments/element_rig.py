@@ -1,7 +1,7 @@
-"""One cylinder on a guided, driven carriage over a fixed soft jig: the rig of the element tests.
+"""One part on a guided, driven carriage over a fixed soft jig: the rig of the element tests.
 
-The cylinder is lowered to a depth, the bag is jammed, the carriage lets go, and a stiff spring
-drags the cylinder sideways or up at constant speed. Force and displacement are recorded.
+The part is lowered to a depth, the bag is jammed, the carriage lets go, and a stiff spring
+drags the part sideways or up at constant speed. Force and displacement are recorded.
 """
 
 from __future__ import annotations
@@ -9,35 +9,24 @@ from __future__ import annotations
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
-from pydrake.common import MemoryFile
-from pydrake.geometry import (
-    AddContactMaterial,
-    AddRigidHydroelasticProperties,
-    Convex,
-    InMemoryMesh,
-    ProximityProperties,
-)
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
-    CoulombFriction,
     ExternallyAppliedSpatialForce,
     MultibodyPlantConfig,
 )
 from pydrake.multibody.tree import (
     PdControllerGains,
     PrismaticJoint,
-    RigidBody,
     SpatialInertia,
 )
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
-from trimesh.exchange.obj import export_obj
 
 from cell.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
+from experiments.specimens import Prism, Specimen
 
 Array = NDArray[np.float64]
 
@@ -45,40 +34,6 @@ Array = NDArray[np.float64]
 # against the bed's 10 to 100 N/mm, soft enough for an explicit force at 1 ms on 0.2 kg.
 DRAG_STIFFNESS = 2.0e4
 DRAG_DAMPING = 40.0
-# Part friction in the reference runs.
-FRICTION = 0.5
-
-
-@dataclass(frozen=True)
-class Prism:
-    """A regular prism that stands for a round part: axis along z, its low end at z = 0.
-
-    Attributes:
-        radius: Mean radius [m].
-        length: [m].
-        mass: [kg].
-        facets: Around it.
-    """
-
-    radius: float = 0.0175
-    length: float = 0.054
-    mass: float = 0.2
-    facets: int = 24
-
-    def mesh(self) -> trimesh.Trimesh:
-        """Return the surface; the corners lie outside so that the mean radius is right."""
-        angle = np.arange(self.facets) * 2 * np.pi / self.facets
-        corner = self.radius * 2 / (1 + np.cos(np.pi / self.facets))
-        ring = corner * np.column_stack([np.cos(angle), np.sin(angle)])
-        ends = [np.column_stack([ring, np.full(self.facets, z)]) for z in (0.0, self.length)]
-        return trimesh.convex.convex_hull(np.concatenate(ends))
-
-    def inertia(self) -> SpatialInertia:
-        """Return the inertia of a solid cylinder about its low end."""
-        solid = SpatialInertia.SolidCylinderWithMass(
-            self.mass, self.radius, self.length, [0.0, 0.0, 1.0]
-        )
-        return solid.Shift([0.0, 0.0, -self.length / 2])
 
 
 @dataclass(frozen=True)
@@ -102,15 +57,15 @@ class ElementRig:
 
     Attributes:
         params: Of the jig.
-        part: The cylinder.
-        lying: Its axis is horizontal.
+        part: What is pressed into the bed.
+        press_force: Limit of the carriage's drive [N].
         time_step: [s].
         approximation: Drake's discrete contact approximation.
     """
 
     params: JigParameters = field(default_factory=JigParameters)
-    part: Prism = field(default_factory=Prism)
-    lying: bool = False
+    part: Specimen = field(default_factory=Prism)
+    press_force: float = 500.0
     time_step: float = 1e-3
     approximation: str = "lagged"
 
@@ -125,7 +80,8 @@ class ElementRig:
         base = self.plant.AddRigidBody("base", SpatialInertia.SolidBoxWithMass(1.5, 0.2, 0.2, 0.02))
         self.plant.WeldFrames(self.plant.world_frame(), base.body_frame())
         self.jig = SoftJig.add(self.plant, self.scene_graph, base, self.params)
-        self.body = self._add_part()
+        self.body = self.part.add_to(self.plant)
+        self._X_CP = self.part.X_CP
         self._add_carriage()
         self.plant.Finalize()
         self.simulator = Simulator(builder.Build())
@@ -143,29 +99,10 @@ class ElementRig:
         self._slide.set_translation(self.context, self._height)
         self.simulator.Initialize()
 
-    @property
-    def _X_CP(self) -> RigidTransform:
-        """Pose of the part in the carriage: its lowest point at the carriage's origin."""
-        if not self.lying:
-            return RigidTransform()
-        turn = RotationMatrix.MakeYRotation(np.pi / 2)
-        apothem = self.part.mesh().bounds[1, 0]
-        return RigidTransform(turn, [-self.part.length / 2, 0.0, apothem])
-
     @staticmethod
     def X_JC(height: float) -> RigidTransform:
         """Return the carriage's pose."""
         return RigidTransform([0.0, 0.0, height])
-
-    def _add_part(self) -> RigidBody:
-        body = self.plant.AddRigidBody("part", self.part.inertia())
-        text = export_obj(self.part.mesh(), digits=12)
-        shape = Convex(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "part")))
-        properties = ProximityProperties()
-        AddRigidHydroelasticProperties(0.01, properties)
-        AddContactMaterial(friction=CoulombFriction(FRICTION, FRICTION), properties=properties)
-        self.plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "bed_part", properties)
-        return body
 
     def _add_carriage(self) -> None:
         instance = self.plant.AddModelInstance("carriage")
@@ -176,7 +113,7 @@ class ElementRig:
                 "slide", self.plant.world_frame(), carriage.body_frame(), [0.0, 0.0, 1.0]
             )
         )
-        actuator = self.plant.AddJointActuator("slide", self._slide, 500.0)
+        actuator = self.plant.AddJointActuator("slide", self._slide, self.press_force)
         actuator.set_controller_gains(PdControllerGains(p=1e6, d=1e4))
         self.plant.set_gravity_enabled(instance, False)
         self._carriage = instance
@@ -218,17 +155,18 @@ class ElementRig:
         return float(forces[0].F_Bq_W.translational()[2]) if forces else 0.0
 
     def jam(self) -> None:
-        """Evacuate until the pressure is there."""
+        """Evacuate until the pressure is there, then hold the place instead of pressing on."""
         self.jig.evacuate(self.root)
         while self.jig.state is not JigState.JAMMED:
             self.step()
+        self._set_height(self.params.bag.cap_height - self.depth, 0.0)
         self.step(round(0.5 / self.time_step))
 
-    def let_go(self) -> None:
-        """Open the grip and wait until the part rests."""
+    def let_go(self, wait: float = 0.5) -> None:
+        """Open the grip and wait [s]."""
         self.plant.SetConstraintActiveStatus(self.context, self._grip, False)
         self._set_height(0.3, 0.0)
-        self.step(round(0.5 / self.time_step))
+        self.step(round(wait / self.time_step))
 
     def drag(self, p_PQ: Array, direction: Array, way: float = 0.006, speed: float = 0.01) -> Drag:
         """Drag point Q of the part along a direction of J [m]; the target moves at `speed`."""
@@ -257,6 +195,12 @@ class ElementRig:
         applied.p_BoBq_B = p_PQ
         applied.F_Bq_W = SpatialForce(np.zeros(3), force)
         return applied
+
+    @property
+    def speed(self) -> float:
+        """Speed of the part's origin [m/s]."""
+        V_WP = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.body)
+        return float(np.linalg.norm(V_WP.translational()))
 
     @property
     def X_JP(self) -> RigidTransform:

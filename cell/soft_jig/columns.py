@@ -24,6 +24,8 @@ Triangle = tuple[int, int, int]
 SAME_HEIGHT = 2e-5
 # From this many corners on, a face is round and gets a triangle in its middle.
 MANY = 16
+# How far the center of a smaller face's fan is moved from the middle towards its first corner.
+FAN_SHIFT = 0.3
 # Size of the triangle in the middle of a many-sided face, relative to the face.
 CORE = 0.4
 
@@ -173,10 +175,11 @@ class ColumnMesh:
         if len(ring) == 4:
             return [(ring[0], ring[1], ring[2]), (ring[0], ring[2], ring[3])]
         corners = np.array([self._nodes[i] for i in ring])
-        if len(ring) < MANY:
-            center = self._add([*_off_center(corners), center_height])
-            return [(a, b, center) for a, b in _cyclic(ring)]
         middle = np.array([*corners[:, :2].mean(axis=0), center_height])
+        if len(ring) < MANY:
+            # Not in the middle, where Drake puts the part's fan.
+            center = self._add(middle + FAN_SHIFT * (corners[0] - middle))
+            return [(a, b, center) for a, b in _cyclic(ring)]
         slope = np.linalg.lstsq(corners[:, :2] - middle[:2], corners[:, 2] - corners[:, 2].mean())[
             0
         ]
@@ -214,11 +217,6 @@ class ColumnMesh:
             faces.append((id_low[i], id_high[j], third))
             i, j = (i + 1, j) if step_low else (i, j + 1)
         return faces
-
-
-def _off_center(corners: Array) -> Array:
-    """Return the center (2,) of a fan: not the middle, where Drake puts the part's fan."""
-    return 0.7 * corners[:, :2].mean(axis=0) + 0.3 * corners[0, :2]
 
 
 def _core(corners: Array, middle: Array, slope: Array) -> Array:

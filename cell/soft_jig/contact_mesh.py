@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cell.soft_jig.bed import Bed
-from cell.soft_jig.columns import SAME_HEIGHT, Column, ColumnMesh, TetMesh
+from cell.soft_jig.columns import Column, ColumnMesh, TetMesh
 from cell.soft_jig.parameters import JammedParameters
 from cell.soft_jig.plane_cells import cell_edges, conforming_cells, outline
 from cell.soft_jig.polygons import (
@@ -306,25 +306,21 @@ def _with_rings(
 
 def _wall_heights(floor: Sequence[Column], loop: list[int], rim: Array) -> Array:
     """Return the height (n,) of the wall around one flat floor; 0 where it has a step."""
-    tops: dict[int, list[float]] = {}
-    for column in floor:
-        for corner, top in zip(column.corners, column.tops, strict=True):
-            tops.setdefault(corner, []).append(float(top))
-    low = np.array([min(tops[corner]) for corner in loop])
-    high = np.array([max(tops[corner]) for corner in loop])
-    sides = np.column_stack([rim[:, 0], np.roll(rim[:, 1], 1)]) - low[:, None]
     if len(floor) > 1:
         return np.zeros(len(loop))
-    even = (sides.min(axis=1) > sides.max(axis=1) / 2) & (high - low < SAME_HEIGHT)
+    (column,) = floor
+    low = column.tops[[column.corners.index(corner) for corner in loop]]
+    sides = np.column_stack([rim[:, 0], np.roll(rim[:, 1], 1)]) - low[:, None]
+    even = sides.min(axis=1) > sides.max(axis=1) / 2
     return np.where(even, sides.max(axis=1), 0.0)
 
 
 def _closing(wall: Array, params: JammedParameters) -> tuple[Array, Array]:
     """Return how far to shift the wall's foot outwards and its slope (n,); the mean stays.
 
-    A wall that is low somewhere, or not around one flat floor, keeps its offset as a whole.
+    A wall that is low or uneven, or not around one flat floor, keeps its offset as a whole.
     """
-    if wall.min() < LEAST_WALL:
+    if wall.min() < max(LEAST_WALL, wall.max() / 2):
         return np.zeros(len(wall)), np.zeros(len(wall))
     shift = FOOT_GAP - params.squeeze
     return np.full(len(wall), shift), -2 * shift / wall
