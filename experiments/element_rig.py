@@ -46,8 +46,9 @@ class Drag:
 
     @property
     def holding_force(self) -> float:
-        """Largest force after the start-up, median over 5 ms [N]."""
-        smooth = np.median(np.lib.stride_tricks.sliding_window_view(self.force, 5), axis=1)
+        """Largest force once the part has moved by 0.05 mm, median over 5 steps [N]."""
+        moving = self.force[int(np.argmax(self.way > 0.05e-3)) :]
+        smooth = np.median(np.lib.stride_tricks.sliding_window_view(moving, 5), axis=1)
         return float(smooth.max())
 
 

@@ -34,7 +34,7 @@ from cell.soft_jig.drake_values import (
     lean_of,
 )
 from cell.soft_jig.holding import Holding
-from cell.soft_jig.parameters import JigParameters
+from cell.soft_jig.parameters import FULL_VACUUM, JigParameters
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.suction import Seal, SealedPatch
 from cell.soft_jig.visual import membrane_shape
@@ -287,11 +287,8 @@ class SoftJig:
         """Replace contact and visible geometry in the Context by the present mesh and surface."""
         context = self._scene_graph.GetMyMutableContextFromRoot(root_context)
         graph, source = self._scene_graph, self._plant.get_source_id()
-        jammed = self.params.jammed
-        frozen = self.state is JigState.JAMMED
-        gradient = jammed.pressure_gradient if frozen else jammed.soft_gradient
         self._holding.forget()
-        properties = drake_proximity(self._mesh, self.params, gradient)
+        properties = drake_proximity(self._mesh, self.params, self._gradient())
         with self.filters_lifted(root_context):
             # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
             graph.RemoveRole(context, source, self._bed_id, Role.kProximity)
@@ -299,6 +296,15 @@ class SoftJig:
             graph.AssignRole(context, source, self._bed_id, properties)
             self._filter(context)
         self._draw(context)
+
+    def _gradient(self) -> float:
+        """Return the contact pressure per depth [Pa/m]; frozen, for the pump's full vacuum."""
+        jammed = self.params.jammed
+        if self.state is not JigState.JAMMED:
+            return jammed.soft_gradient
+        rest = self.bed.confinement - self.bed.vacuum
+        ratio = (self.params.vacuum.pressure + rest) / (FULL_VACUUM + rest)
+        return jammed.pressure_gradient * float(np.sqrt(ratio))
 
     def _filter(self, context: Context) -> None:
         """Exclude the bed from its own base and from what must not touch it; a swap forgets it."""

@@ -8,9 +8,11 @@ run with glass beads in a dome of the same size.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import ClassVar
 
 import numpy as np
+
+# Vacuum at which stiffness and suction of the frozen bed are stated [Pa]; [S] about 90 kPa.
+FULL_VACUUM = 90e3
 
 
 @dataclass(frozen=True)
@@ -113,8 +115,8 @@ class JammedParameters:
     """The frozen bed: a compliant hydroelastic body.
 
     Attributes:
-        pressure_gradient: Contact pressure per depth [Pa/m]. [A] 2.5e8 (1-5 MPa over 4-20 mm);
-            holding hardly depends on it, holding stiffness does.
+        pressure_gradient: Contact pressure per depth at 90 kPa [Pa/m]. [A] 2.5e8 (1-5 MPa over
+            4-20 mm); stiffness of a packing goes with the square root of its confinement [R].
         soft_gradient: The same while not jammed, for hands that touch the bag [Pa/m]. [A] one
             tenth: stiffness of a packing goes with the square root of pressure [R].
         squeeze: Offset g of the wall from the part's outline [m], negative squeezes. [R] DEM: the
@@ -166,12 +168,9 @@ class SuctionParameters:
     slip: float = 3.0e-3
     lip: float = 3.0e-3
 
-    # Vacuum at which `strength` is stated [Pa].
-    FULL_VACUUM: ClassVar[float] = 90e3
-
     def pressure(self, vacuum: float) -> float:
         """Return the suction on closed contact under a vacuum [Pa]."""
-        return self.strength * vacuum / self.FULL_VACUUM if self.enabled else 0.0
+        return self.strength * vacuum / FULL_VACUUM if self.enabled else 0.0
 
 
 @dataclass(frozen=True)

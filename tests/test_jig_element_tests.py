@@ -1,0 +1,54 @@
+"""The element tests' script: reference data, formulas, and one short run of each kind."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from experiments.jig_element_tests import CYLINDER, Row, held, lateral_formula, punch, reference
+from experiments.jig_element_tests import UP as Z
+
+
+def test_reference_has_a_force_for_every_depth() -> None:
+    data = reference()
+    for kind in ("vented_lateral", "sealed_lateral"):
+        assert len(data[kind]["depth_mm"]) == len(data[kind]["force_N"])
+
+
+def test_formula_is_the_statics_of_the_standing_cylinder() -> None:
+    """132 kPa on 35 x 10 mm and the weight overturn at 5.3 N; the seal adds p A b over it."""
+    vented = lateral_formula(0.010, 90e3, sealed=False)
+    assert vented == pytest.approx((132e3 * 0.035 * 0.010 * 0.005 + 1.96 * 0.0175) / 0.05, rel=0.01)
+    sealed = lateral_formula(0.010, 90e3, sealed=True) - vented
+    assert sealed == pytest.approx(90e3 * np.pi * 0.0175**2 * 0.0175 / 0.05)
+
+
+def test_soft_bed_is_stiffer_than_beads_without_a_membrane() -> None:
+    """The reference has no membrane: a lower bound, and within a factor of four."""
+    curve = punch(0.010, step=2e-3)
+    dome = reference()["dome_punch"]
+    for depth, pressure in zip(dome["depth_mm"][2:8], dome["pressure_kPa"][2:8], strict=True):
+        ours = np.interp(depth / 1e3, *curve.T) / 1e3
+        assert 0.9 * pressure < ours < 4 * pressure
+
+
+@pytest.fixture(scope="module")
+def pulls() -> dict[bool, float]:
+    """Return the largest upward pull that a shallow vented and a sealed cylinder resist [N]."""
+    forces = {}
+    for sealed in (False, True):
+        rig = held(0.005, 90e3, sealed)
+        drag = rig.drag(np.array([0.0, 0.0, CYLINDER.length]), Z, way=0.007, speed=0.03)
+        forces[sealed] = drag.holding_force
+    return forces
+
+
+def test_seal_decides_the_pull_out(pulls: dict[bool, float]) -> None:
+    """Vented little more than the weight of 2 N; sealed at least the suction, 87 N, more."""
+    assert pulls[False] < 8.0
+    assert pulls[True] - pulls[False] == pytest.approx(90e3 * np.pi * 0.0175**2, rel=0.3)
+
+
+def test_row_without_reference_says_so() -> None:
+    assert np.isnan(Row("x", 1.0).formula)
+    assert np.isnan(Row("x", 1.0).reference).all()
