@@ -44,6 +44,11 @@ PLATE = [
     box([-0.035, -0.033, 0], [0.035, 0.027, 0.005]),
     box([-0.035, -0.033, -0.015], [0.035, -0.028, 0]),
 ]
+# Foot and face side by side, as in the model: leaning, their undersides part or overlap.
+PLATE_PIECES = [
+    box([-0.035, -0.028, 0], [0.035, 0.027, 0.005]),
+    box([-0.035, -0.033, -0.015], [0.035, -0.028, 0.005]),
+]
 POSTURES = {
     "motor standing": (MOTOR, [0, 0, 0]),
     "motor standing, turned": (MOTOR, [0, 0, 17]),
@@ -51,6 +56,8 @@ POSTURES = {
     "motor lying, turned": (MOTOR, [90, 0, 30]),
     "plate face down": (PLATE, [180, 0, 0]),
     "plate foot down": (PLATE, [0, 0, 0]),
+    "plate foot down, leaning back": (PLATE_PIECES, [-0.4, 0.1, 75]),
+    "plate foot down, leaning forward": (PLATE_PIECES, [0.4, 0.1, 10]),
     "plate on its foot": (PLATE, [90, 0, 0]),
     "plate on its foot, turned": (PLATE, [90, 0, 20]),
 }

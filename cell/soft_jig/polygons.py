@@ -5,6 +5,7 @@ Polygons are (k, 2) arrays, counter-clockwise.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -106,6 +107,31 @@ def subtract(polygon: Array, hole: Array) -> list[Array]:
         pieces.append(clip_half_plane(polygon, -normal, -distance))
         polygon = clip_half_plane(polygon, normal, distance)
     return [piece for piece in pieces if len(piece)]
+
+
+def closed_up(polygon: Array, others: Sequence[Array], crack: float) -> Array:
+    """Return the polygon with corners that are nearer than ``crack`` to another one moved onto it.
+
+    To a corner of the other polygon where there is one that near, otherwise to its border.
+    """
+    for other in others:
+        if len(polygon) == 0:
+            break
+        polygon = np.array([_moved_onto(corner, other, crack) for corner in polygon])
+        distinct = np.abs(polygon - np.roll(polygon, 1, axis=0)).max(axis=1) > WELD
+        polygon = polygon[distinct] if distinct.sum() > 2 else np.zeros((0, 2))
+    return polygon
+
+
+def _moved_onto(corner: Array, other: Array, crack: float) -> Array:
+    edge = np.roll(other, -1, axis=0) - other
+    along = np.einsum("ij,ij->i", corner - other, edge) / np.einsum("ij,ij->i", edge, edge)
+    border = other + np.clip(along, 0.0, 1.0)[:, None] * edge
+    for candidates in (other, border):
+        distance = np.linalg.norm(candidates - corner, axis=1)
+        if distance.min() < crack:
+            return candidates[np.argmin(distance)]
+    return corner
 
 
 def area(polygon: Array) -> float:
