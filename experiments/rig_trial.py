@@ -1,0 +1,211 @@
+"""One trial with the rig: place a part on the jig, and push it if that is asked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cell.config import CellConfig
+from cell.phase import PhaseFailed
+from cell.product import Grasp, Part
+from cell.rig import HandPose, Rig
+from cell.rig_simulation import RigSimulation
+from cell.soft_jig import SurfaceSamples
+from experiments.postures import AXES, MM, Posture, Push
+from experiments.reach import Fingers
+from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
+from planning.operations.pick_place import DEEPEST, JAM_TIME, PRESS_SPEED, SETTLE_TIME
+from planning.operations.placement import upright
+
+HOVER = 0.004  # The part starts this far above the bag [m] [A].
+RETREAT = 0.08
+TRAVEL_SPEED = 0.3  # Of the hand in the free [m/s] [A].
+COAST_TIME = 0.6  # From the hand's stop until everything rests again [s] [A].
+BACK_OFF = 0.03  # Before the "after" picture [m] [A].
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """What is not where it should be in a trial.
+
+    Attributes:
+        X_PDrawn: Error of the part in the grasp.
+        jig_offset: (2,) of the jig on the force plate [m].
+    """
+
+    X_PDrawn: RigidTransform
+    jig_offset: np.ndarray
+
+    @staticmethod
+    def draw(config: CellConfig, rng: np.random.Generator) -> Disturbance:
+        """Draw one."""
+        push = config.push
+        angles = rng.normal(scale=np.deg2rad(push.grasp_angle_sigma_deg), size=3)
+        offset = rng.normal(scale=push.grasp_position_sigma, size=3)
+        jig = rng.normal(scale=push.jig_position_sigma, size=2)
+        return Disturbance(RigidTransform(RollPitchYaw(angles), offset), jig)
+
+
+@dataclass
+class Trial:
+    """What happened.
+
+    Attributes:
+        placed: Pose of the part on the jig after placing, when it got so far.
+        before, after: Pose of the jig around the push.
+        moved: Pose of the part on the jig after the push.
+        failure: The phase that failed and why; None if all phases ran.
+        log: Arrays of the whole trial.
+        marks: Time of each event [s].
+        measured: Quantity -> value.
+    """
+
+    planned: RigidTransform
+    placed: RigidTransform | None = None
+    before: RigidTransform | None = None
+    after: RigidTransform | None = None
+    moved: RigidTransform | None = None
+    failure: tuple[str, str] | None = None
+    log: dict[str, np.ndarray] = field(default_factory=dict)
+    marks: dict[str, float] = field(default_factory=dict)
+    sim_seconds: float = 0.0
+    cpu_seconds: float = 0.0
+
+
+def planned_pose(part: Part, posture: Posture, X_WJ: RigidTransform, height: float):
+    """Return X_WP: upright, centre of mass over the jig, lowest point at a height over J [m]."""
+    R_WP = upright(posture.up, 0.0)
+    points = part.mesh.vertices @ R_WP.matrix().T
+    centre = R_WP @ part.mesh.center_mass
+    offset = np.array([-centre[0], -centre[1], height - points[:, 2].min()])
+    return RigidTransform(R_WP, X_WJ.translation() + offset)
+
+
+def tip_pose(rig: Rig, X_WP: RigidTransform, grasp: Grasp) -> HandPose:
+    """Return where the hand is when its jaw is at a grasp of the part."""
+    hand = rig.gripper.instance
+    X_TipMount = rig.plant.GetFrameByName("tip", hand).GetFixedPoseInBodyFrame().inverse()
+    X_TipJaw = X_TipMount @ rig.plant.GetFrameByName(grasp.jaw, hand).GetFixedPoseInBodyFrame()
+    return HandPose.of(X_WP @ grasp.X_PJaw @ X_TipJaw.inverse())
+
+
+def run_trial(rig: Rig, posture: Posture, push: Push | None, rng: np.random.Generator) -> Trial:
+    """Place the part with the rig's hand and, if asked, push it.
+
+    Args:
+        rig: Built for the part; used again and again.
+        posture: How the part is placed.
+        push: None: only place.
+        rng: Draws the disturbance.
+    """
+    config, part = rig.config, rig.part.part
+    X_WJ = config.workcell.X_WJ
+    disturbance = Disturbance.draw(config, rng)
+    X_WP = planned_pose(part, posture, X_WJ, config.jig.bag.cap_height + HOVER)
+    pose = tip_pose(rig, X_WP, posture.grasp)
+    offset = np.array([*disturbance.jig_offset, 0.0])
+    trial = Trial(planned=X_WJ.InvertAndCompose(X_WP))
+    simulation = RigSimulation(
+        rig,
+        RigidTransform(X_WJ.rotation(), X_WJ.translation() + offset),
+        X_WP @ disturbance.X_PDrawn,
+        pose,
+    )
+    try:
+        _place(simulation, posture.grasp, trial)
+        if push is not None:
+            _push(simulation, push, trial)
+    except PhaseFailed as error:
+        trial.failure = (error.phase, error.evidence)
+    trial.moved = simulation.X_JP
+    trial.log = simulation.log.arrays()
+    trial.sim_seconds, trial.cpu_seconds = simulation.time, simulation.stepping_cpu
+    return trial
+
+
+def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial) -> None:
+    """Grip, press, freeze, let go: as the robot does it."""
+    rig = simulation.rig
+    opening = tip_opening(grasp)
+    simulation.begin("grip")
+    simulation.jaws(opening, grasp.force)
+    simulation.wait(GRIP_TIME)
+    rig.let_part_go(simulation.root)
+    simulation.wait(0.1)
+    simulation.begin("press")
+    simulation.press_with_part()
+    if not simulation.lower(PRESS_SPEED, DEEPEST, rig.config.placement.press_force):
+        raise PhaseFailed("press", f"no resistance within {DEEPEST * 1e3:g} mm")
+    simulation.begin("jam")
+    simulation.evacuate()
+    simulation.wait(JAM_TIME)
+    if not simulation.frozen:
+        raise PhaseFailed("jam", f"the bag is still soft after {JAM_TIME:g} s")
+    simulation.begin("release")
+    simulation.jaws(opening + CLEARANCE)
+    simulation.wait(RELEASE_TIME)
+    start = simulation.pose
+    for distance, speed in ((CLEAR, 0.08), (RETREAT, TRAVEL_SPEED)):
+        back = start.p_WT - distance * start.R_WT.matrix()[:, 2]
+        simulation.move(replace(start, p_WT=back), speed)
+    simulation.begin("settle")
+    simulation.wait(SETTLE_TIME)
+    trial.placed = simulation.X_JP
+
+
+def _push(simulation: RigSimulation, push: Push, trial: Trial) -> None:
+    """Bring the closed hand beside the part, push, and back off."""
+    rig, numbers = simulation.rig, simulation.rig.config.push
+    simulation.begin("approach")
+    simulation.jaws(0.0)
+    start, direction = push_start(simulation, push)
+    high = start.p_WT + np.array([0.0, 0.0, 0.12]) - 0.05 * direction
+    simulation.move(replace(start, p_WT=high), 2 * TRAVEL_SPEED)
+    simulation.move(replace(start, p_WT=start.p_WT - 0.02 * direction), TRAVEL_SPEED)
+    simulation.move(start, TRAVEL_SPEED / 3)
+    simulation.wait(0.1)
+    trial.before = simulation.X_WJ
+    simulation.begin("push")
+    goal = replace(start, p_WT=start.p_WT + numbers.stroke * direction)
+    simulation.push(goal, numbers.speed, numbers.acceleration)
+    simulation.begin("coast")
+    simulation.wait(COAST_TIME)
+    trial.after = simulation.X_WJ
+
+
+def push_start(simulation: RigSimulation, push: Push) -> tuple[HandPose, np.ndarray]:
+    """Return where the hand starts its push, and the direction (3,) in W.
+
+    The one rule for all cases: the fingers' lowest point at `height_fraction` of the exposed height
+    of the pushed face where the hand meets it, and `bed_clearance` above the bed at least; the hand
+    starts `start_gap` before it touches.
+    """
+    rig, numbers = simulation.rig, simulation.rig.config.push
+    X_WP = simulation.X_WP
+    foot, top = (X_WP @ (np.array(point) * MM) for point in (push.foot, push.top))
+    direction = X_WP.rotation() @ AXES[push.along]
+    direction = np.array([direction[0], direction[1], 0.0]) / np.hypot(*direction[:2])
+    bed = bed_height(simulation, foot[:2])
+    low = max(foot[2], bed)
+    height = max(low + numbers.height_fraction * (top[2] - low), bed + numbers.bed_clearance)
+    samples = SurfaceSamples.of(rig.part.part.name, rig.part.part.mesh)
+    fingers = Fingers.of_hand(rig)
+    travel = fingers.travel(X_WP @ samples.points.T, top[:2], height, direction)
+    p_WT = np.array([*top[:2], height + fingers.below_tip])
+    p_WT += (travel - numbers.start_gap) * direction
+    turn = float(np.arctan2(-direction[0], direction[1]))
+    return HandPose(p_WT, turn), direction
+
+
+def bed_height(simulation: RigSimulation, p_WQ: np.ndarray, radius: float = 5e-3) -> float:
+    """Return the highest the bed stands in W around a point (2,) [m]."""
+    jig, X_WJ = simulation.rig.soft_jig, simulation.X_WJ
+    if jig is None:
+        return float(X_WJ.translation()[2] + simulation.rig.config.jig.bag.cap_height)
+    p_JQ = X_WJ.inverse() @ np.array([*p_WQ, X_WJ.translation()[2]])
+    ring = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    around = p_JQ[:2] + radius * np.column_stack([np.cos(ring), np.sin(ring)])
+    heights = jig.bed.height_at(np.vstack([p_JQ[:2], around]))
+    return float(X_WJ.translation()[2] + heights.max())
