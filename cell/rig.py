@@ -7,7 +7,7 @@ tilt. It stands in for an arm whose path is given: its drives follow stiffly up 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import trimesh
@@ -15,17 +15,24 @@ from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
     AddRigidHydroelasticProperties,
+    CollisionFilterDeclaration,
+    CollisionFilterManager,
     Convex,
     Cylinder,
+    FilterId,
     GeometryId,
+    GeometrySet,
     ProximityProperties,
     RoleAssign,
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
+    Joint,
+    ModelInstanceIndex,
     PdControllerGains,
     PrismaticJoint,
     RevoluteJoint,
@@ -54,6 +61,7 @@ LINK_MASS = 2.0  # Of each slide [kg] [A].
 CARRIAGE_JOINTS = ("x", "y", "z", "turn", "tilt")
 
 BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
+FLAT_HINT = 0.5  # Two flat faces: few large elements tell as much as many small ones [m] [A].
 RIGID_FRICTION = 0.3  # Metal on metal [A].
 
 
@@ -107,6 +115,7 @@ class Rig:
         hand: Frame T between the tip pads.
         wrist: Wrench between carriage and hand.
         force_plate: Wrench under the force plate.
+        asleep: The filter between jig and force plate while they sleep.
     """
 
     config: CellConfig
@@ -121,13 +130,16 @@ class Rig:
     hand_length: float
     wrist: WrenchSensor
     force_plate: WrenchSensor
+    asleep: list[FilterId] = field(default_factory=list)
 
     def joints(self, pose: HandPose) -> np.ndarray:
         """Return the carriage's joint positions (5,) for a hand pose."""
         mount = pose.p_WT - pose.R_WT @ np.array([0.0, 0.0, self.hand_length])
         return np.array([*mount, pose.turn, pose.tilt])
 
-    def reset(self, root: Context, X_WJ: RigidTransform, X_WP: RigidTransform, q: np.ndarray):
+    def reset(
+        self, root: Context, X_WJ: RigidTransform, X_WP: RigidTransform, q: np.ndarray
+    ) -> None:
         """Put a new Context into the initial state: bag inflated, part held by a stand.
 
         Args:
@@ -139,15 +151,49 @@ class Rig:
         context = self.plant.GetMyMutableContextFromRoot(root)
         self.plant.SetFreeBodyPose(context, self.jig_base, X_WJ)
         self.jig_base.SetSpatialInertiaInBodyFrame(context, _jig_inertia(self.config))
-        self.part.show(root)
         self.part.joint.SetPose(context, X_WP)
         self.part.joint.Lock(context)
         self.plant.SetPositions(context, self.drive.instance, q)
         self.drive.set_target(root, q, np.zeros(len(q)))
+        self.asleep.clear()  # A new Context knows of no filter.
+        self.part.sleep_filter = None
         if self.soft_jig is not None:
             for body in self.soft_jig.pressing:
                 self.soft_jig.release(body)
             self.soft_jig.inflate(root)
+
+    def sleep(self, root: Context) -> None:
+        """Put part and jig to sleep where they rest."""
+        context = self.plant.GetMyMutableContextFromRoot(root)
+        self.part.sleep(root)
+        self.plant.SetFreeBodySpatialVelocity(context, self.jig_base, SpatialVelocity.Zero())
+        self._jig_joint.Lock(context)
+        plate = self.force_plate.weld.child_body()
+        geometries = self.plant.GetCollisionGeometriesForBody
+        pair = GeometrySet(geometries(self.jig_base)), GeometrySet(geometries(plate))
+        apart = CollisionFilterDeclaration().ExcludeBetween(*pair)
+        self.asleep.append(self._filters(root).ApplyTransient(apart))
+
+    def wake(self, root: Context) -> None:
+        """Wake part and jig."""
+        for filter_id in self.asleep:
+            self._filters(root).RemoveDeclaration(filter_id)
+        self.asleep.clear()
+        self._jig_joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
+        self.part.wake(root)
+
+    @property
+    def _jig_joint(self) -> Joint:
+        (joint,) = [
+            joint
+            for joint in map(self.plant.get_joint, self.plant.GetJointIndices())
+            if joint.child_body().index() == self.jig_base.index()
+        ]
+        return joint
+
+    def _filters(self, root: Context) -> CollisionFilterManager:
+        context = self.scene_graph.GetMyMutableContextFromRoot(root)
+        return self.scene_graph.collision_filter_manager(context)
 
     def let_part_go(self, root: Context) -> None:
         """Take the stand away."""
@@ -169,7 +215,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str, bed: str = "
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
     plate_weld, jig_base = add_workcell(plant, config, product)
     for body in (plate_weld.child_body(), jig_base):
-        _set_friction(plant, scene_graph, body, config.push.base_friction)
+        _set_sliding(plant, scene_graph, body, config.push.base_friction)
     parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
     soft_jig = None
     if bed == "soft":
@@ -199,7 +245,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str, bed: str = "
     )
 
 
-def _add_carriage(plant: MultibodyPlant) -> tuple[WeldJoint, int]:
+def _add_carriage(plant: MultibodyPlant) -> tuple[WeldJoint, ModelInstanceIndex]:
     """Add the carriage with the hand; return the weld between them and the hand's instance."""
     instance = plant.AddModelInstance("carriage")
     axes = np.eye(3)
@@ -242,14 +288,16 @@ def _jig_inertia(config: CellConfig) -> SpatialInertia:
     return base
 
 
-def _set_friction(
+def _set_sliding(
     plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, friction: float
 ) -> None:
+    """Set the friction between base and force plate, and mesh their flat contact coarsely."""
     inspector = scene_graph.model_inspector()
     for geometry in plant.GetCollisionGeometriesForBody(body):
         properties = ProximityProperties(inspector.GetProximityProperties(geometry))
         material = CoulombFriction(friction, friction)
         properties.UpdateProperty("material", "coulomb_friction", material)
+        properties.UpdateProperty("hydroelastic", "resolution_hint", FLAT_HINT)
         source = plant.get_source_id()
         scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
 

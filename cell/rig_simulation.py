@@ -11,13 +11,15 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from cell.errors import CellError
 from cell.log import Log
 from cell.phase import PhaseFailed
 from cell.rig import HandPose, Rig
-from cell.soft_jig import JigState, SurfaceSamples
+from cell.soft_jig import JigState, SoftJig, SurfaceSamples
 
 # A part this far below the top of the jig's base, or this far from its axis, has dropped off [m].
 DROPPED_BELOW, DROPPED_BESIDE = 0.02, 0.12
+RECORD_PERIOD = 2e-3  # [s] A force plate samples at 500 Hz or more [A].
 
 
 @dataclass(frozen=True)
@@ -78,7 +80,7 @@ class RigSimulation:
     Attributes:
         root: Context of the diagram.
         context: Context of the plant.
-        log: Every step: time, poses, wrenches less their reading at the start.
+        log: Every `RECORD_PERIOD`: poses, wrenches less their reading at the start.
         stepping_cpu: CPU seconds spent stepping so far.
     """
 
@@ -94,10 +96,11 @@ class RigSimulation:
         self.steps = 0
         self.pose = pose
         self._bed_pushes = False
+        self._record_every = max(1, round(RECORD_PERIOD / self.time_step))
         rig.reset(self.root, X_WJ, X_WP, rig.joints(pose))
         self.simulator.Initialize()
         self._tare = np.zeros(12)
-        self._tare = self._wrenches()
+        self._tare = self._latest = self._wrenches()
 
     @property
     def time_step(self) -> float:
@@ -125,9 +128,9 @@ class RigSimulation:
         return self.X_WJ.InvertAndCompose(self.X_WP)
 
     @property
-    def hand_force(self) -> np.ndarray:
-        """Force (3,) of the surroundings on the hand, in W, less the reading at the start [N]."""
-        return self._wrenches()[3:6]
+    def speed(self) -> float:
+        """Speed of the part's origin in W [m/s]."""
+        return float(np.linalg.norm(self.rig.part.velocity(self.context)[3:]))
 
     # Commands.
 
@@ -158,6 +161,14 @@ class RigSimulation:
         jig = self.rig.soft_jig
         no_pump = jig is None or jig.params.vacuum.pressure == 0
         return no_pump or jig.state is JigState.JAMMED
+
+    def sleep(self) -> None:
+        """Let part and jig rest as they are: nothing touches them, so nothing is computed."""
+        self.rig.sleep(self.root)
+
+    def wake(self) -> None:
+        """Let part and jig move again."""
+        self.rig.wake(self.root)
 
     def wait(self, seconds: float) -> None:
         """Hold everything."""
@@ -210,13 +221,18 @@ class RigSimulation:
         except RuntimeError as error:
             raise self._failure(f"solver failure: {str(error).splitlines()[0]}") from error
         if self.rig.soft_jig is not None:
-            self.rig.soft_jig.step(self.root, self.time_step)
-            self._apply_bed_forces()
-        self._record()
+            self._step_bag(self.rig.soft_jig)
+        if self.steps % self._record_every == 0:
+            self._record()
         self.stepping_cpu += time.process_time() - start
 
-    def _apply_bed_forces(self) -> None:
-        forces = self.rig.soft_jig.applied_forces
+    def _step_bag(self, jig: SoftJig) -> None:
+        try:
+            jig.step(self.root, self.time_step)
+        except CellError as error:
+            # An imprint that the bag cannot hold is a verdict on the trial, not bad input.
+            raise self._failure(str(error)) from error
+        forces = jig.applied_forces
         if forces or self._bed_pushes:
             port = self.rig.plant.get_applied_spatial_force_input_port()
             port.FixValue(self.context, forces)

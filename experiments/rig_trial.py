@@ -19,8 +19,10 @@ from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TI
 from planning.operations.pick_place import DEEPEST, JAM_TIME, PRESS_SPEED, SETTLE_TIME
 from planning.operations.placement import upright
 
-HOVER = 0.004  # The part starts this far above the bag [m] [A].
+HOVER = 0.001  # The part starts this far above the bag [m] [A].
+HOLD_TIME = 0.2  # The hand stays this long after the bag has frozen [s] [A].
 RETREAT = 0.08
+REST_TIME = 0.3  # After the hand has left, before it comes to push [s] [A].
 TRAVEL_SPEED = 0.3  # Of the hand in the free [m/s] [A].
 COAST_TIME = 0.6  # From the hand's stop until everything rests again [s] [A].
 BACK_OFF = 0.03  # Before the "after" picture [m] [A].
@@ -114,7 +116,7 @@ def run_trial(rig: Rig, posture: Posture, push: Push | None, rng: np.random.Gene
         pose,
     )
     try:
-        _place(simulation, posture.grasp, trial)
+        _place(simulation, posture.grasp, trial, SETTLE_TIME if push is None else REST_TIME)
         if push is not None:
             _push(simulation, push, trial)
     except PhaseFailed as error:
@@ -125,7 +127,7 @@ def run_trial(rig: Rig, posture: Posture, push: Push | None, rng: np.random.Gene
     return trial
 
 
-def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial) -> None:
+def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial, settle: float) -> None:
     """Grip, press, freeze, let go: as the robot does it."""
     rig = simulation.rig
     opening = tip_opening(grasp)
@@ -140,7 +142,11 @@ def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial) -> None:
         raise PhaseFailed("press", f"no resistance within {DEEPEST * 1e3:g} mm")
     simulation.begin("jam")
     simulation.evacuate()
-    simulation.wait(JAM_TIME)
+    for _ in range(round(JAM_TIME / simulation.time_step)):
+        simulation.step()
+        if simulation.frozen:
+            break
+    simulation.wait(HOLD_TIME)
     if not simulation.frozen:
         raise PhaseFailed("jam", f"the bag is still soft after {JAM_TIME:g} s")
     simulation.begin("release")
@@ -151,7 +157,7 @@ def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial) -> None:
         back = start.p_WT - distance * start.R_WT.matrix()[:, 2]
         simulation.move(replace(start, p_WT=back), speed)
     simulation.begin("settle")
-    simulation.wait(SETTLE_TIME)
+    simulation.wait(settle)
     trial.placed = simulation.X_JP
 
 
@@ -160,11 +166,13 @@ def _push(simulation: RigSimulation, push: Push, trial: Trial) -> None:
     rig, numbers = simulation.rig, simulation.rig.config.push
     simulation.begin("approach")
     simulation.jaws(0.0)
+    simulation.sleep()
     start, direction = push_start(simulation, push)
     high = start.p_WT + np.array([0.0, 0.0, 0.12]) - 0.05 * direction
     simulation.move(replace(start, p_WT=high), 2 * TRAVEL_SPEED)
     simulation.move(replace(start, p_WT=start.p_WT - 0.02 * direction), TRAVEL_SPEED)
     simulation.move(start, TRAVEL_SPEED / 3)
+    simulation.wake()
     simulation.wait(0.1)
     trial.before = simulation.X_WJ
     simulation.begin("push")
