@@ -159,8 +159,9 @@ class RigSimulation:
     def frozen(self) -> bool:
         """Whether there is nothing left to freeze."""
         jig = self.rig.soft_jig
-        no_pump = jig is None or jig.params.vacuum.pressure == 0
-        return no_pump or jig.state is JigState.JAMMED
+        if jig is None or jig.params.vacuum.pressure == 0:
+            return True
+        return jig.state is JigState.JAMMED
 
     def sleep(self) -> None:
         """Let part and jig rest as they are: nothing touches them, so nothing is computed."""

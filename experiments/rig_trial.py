@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.config import CellConfig
+from cell.errors import BadPart
 from cell.phase import PhaseFailed
 from cell.product import Grasp, Part
 from cell.rig import HandPose, Rig
@@ -25,7 +27,6 @@ RETREAT = 0.08
 REST_TIME = 0.3  # After the hand has left, before it comes to push [s] [A].
 TRAVEL_SPEED = 0.3  # Of the hand in the free [m/s] [A].
 COAST_TIME = 0.6  # From the hand's stop until everything rests again [s] [A].
-BACK_OFF = 0.03  # Before the "after" picture [m] [A].
 
 
 @dataclass(frozen=True)
@@ -55,34 +56,54 @@ class Trial:
     """What happened.
 
     Attributes:
-        placed: Pose of the part on the jig after placing, when it got so far.
-        before, after: Pose of the jig around the push.
-        moved: Pose of the part on the jig after the push.
+        planned: Pose of the part over the jig before it is pressed in, as aimed at.
+        held: Its pose when the bag had frozen, in the hand.
+        placed: Its pose after the hand had left; None if it did not get so far.
+        speed: Of the part then [m/s].
+        before, after: Pose of the jig around the push, in W.
+        last_jig: Pose of the jig at the end, whatever happened.
+        moved: Pose of the part on the jig at the end.
         failure: The phase that failed and why; None if all phases ran.
         log: Arrays of the whole trial.
-        marks: Time of each event [s].
-        measured: Quantity -> value.
+        sim_seconds, cpu_seconds: Simulated time, and CPU time spent stepping [s].
     """
 
     planned: RigidTransform
+    held: RigidTransform | None = None
     placed: RigidTransform | None = None
+    speed: float = 0.0
     before: RigidTransform | None = None
     after: RigidTransform | None = None
+    last_jig: RigidTransform = field(default_factory=RigidTransform)
     moved: RigidTransform | None = None
     failure: tuple[str, str] | None = None
     log: dict[str, np.ndarray] = field(default_factory=dict)
-    marks: dict[str, float] = field(default_factory=dict)
     sim_seconds: float = 0.0
     cpu_seconds: float = 0.0
 
 
-def planned_pose(part: Part, posture: Posture, X_WJ: RigidTransform, height: float):
+def planned_pose(
+    part: Part, posture: Posture, X_WJ: RigidTransform, height: float
+) -> RigidTransform:
     """Return X_WP: upright, centre of mass over the jig, lowest point at a height over J [m]."""
     R_WP = upright(posture.up, 0.0)
     points = part.mesh.vertices @ R_WP.matrix().T
     centre = R_WP @ part.mesh.center_mass
     offset = np.array([-centre[0], -centre[1], height - points[:, 2].min()])
     return RigidTransform(R_WP, X_WJ.translation() + offset)
+
+
+def check_fits(config: CellConfig, part: Part, posture: Posture) -> None:
+    """Raise `BadPart` for a part that is wider than the bag."""
+    R_WP = upright(posture.up, 0.0)
+    size = np.ptp(part.mesh.vertices @ R_WP.matrix().T, axis=0)
+    aperture = 2 * config.jig.bag.aperture_radius
+    if max(size[:2]) > aperture:
+        raise BadPart(
+            part.name,
+            f"it is {1e3 * max(size[:2]):.0f} mm wide in posture {posture.name}, "
+            f"the bag's aperture {1e3 * aperture:.0f} mm",
+        )
 
 
 def tip_pose(rig: Rig, X_WP: RigidTransform, grasp: Grasp) -> HandPose:
@@ -93,7 +114,20 @@ def tip_pose(rig: Rig, X_WP: RigidTransform, grasp: Grasp) -> HandPose:
     return HandPose.of(X_WP @ grasp.X_PJaw @ X_TipJaw.inverse())
 
 
-def run_trial(rig: Rig, posture: Posture, push: Push | None, rng: np.random.Generator) -> Trial:
+Watch = Callable[[str, RigSimulation], None]
+
+
+def ignore(event: str, simulation: RigSimulation) -> None:
+    """Watch nothing."""
+
+
+def run_trial(
+    rig: Rig,
+    posture: Posture,
+    push: Push | None,
+    rng: np.random.Generator,
+    watch: Watch = ignore,
+) -> Trial:
     """Place the part with the rig's hand and, if asked, push it.
 
     Args:
@@ -101,6 +135,7 @@ def run_trial(rig: Rig, posture: Posture, push: Push | None, rng: np.random.Gene
         posture: How the part is placed.
         push: None: only place.
         rng: Draws the disturbance.
+        watch: Told of the events "placed", "before", "after" and "end".
     """
     config, part = rig.config, rig.part.part
     X_WJ = config.workcell.X_WJ
@@ -117,11 +152,13 @@ def run_trial(rig: Rig, posture: Posture, push: Push | None, rng: np.random.Gene
     )
     try:
         _place(simulation, posture.grasp, trial, SETTLE_TIME if push is None else REST_TIME)
+        watch("placed", simulation)
         if push is not None:
-            _push(simulation, push, trial)
+            _push(simulation, push, trial, watch)
     except PhaseFailed as error:
         trial.failure = (error.phase, error.evidence)
-    trial.moved = simulation.X_JP
+    watch("end", simulation)
+    trial.moved, trial.last_jig = simulation.X_JP, simulation.X_WJ
     trial.log = simulation.log.arrays()
     trial.sim_seconds, trial.cpu_seconds = simulation.time, simulation.stepping_cpu
     return trial
@@ -149,6 +186,7 @@ def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial, settle: float)
     simulation.wait(HOLD_TIME)
     if not simulation.frozen:
         raise PhaseFailed("jam", f"the bag is still soft after {JAM_TIME:g} s")
+    trial.held = simulation.X_JP
     simulation.begin("release")
     simulation.jaws(opening + CLEARANCE)
     simulation.wait(RELEASE_TIME)
@@ -158,12 +196,12 @@ def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial, settle: float)
         simulation.move(replace(start, p_WT=back), speed)
     simulation.begin("settle")
     simulation.wait(settle)
-    trial.placed = simulation.X_JP
+    trial.placed, trial.speed = simulation.X_JP, simulation.speed
 
 
-def _push(simulation: RigSimulation, push: Push, trial: Trial) -> None:
+def _push(simulation: RigSimulation, push: Push, trial: Trial, watch: Watch) -> None:
     """Bring the closed hand beside the part, push, and back off."""
-    rig, numbers = simulation.rig, simulation.rig.config.push
+    numbers = simulation.rig.config.push
     simulation.begin("approach")
     simulation.jaws(0.0)
     simulation.sleep()
@@ -175,12 +213,14 @@ def _push(simulation: RigSimulation, push: Push, trial: Trial) -> None:
     simulation.wake()
     simulation.wait(0.1)
     trial.before = simulation.X_WJ
+    watch("before", simulation)
     simulation.begin("push")
     goal = replace(start, p_WT=start.p_WT + numbers.stroke * direction)
     simulation.push(goal, numbers.speed, numbers.acceleration)
     simulation.begin("coast")
     simulation.wait(COAST_TIME)
     trial.after = simulation.X_WJ
+    watch("after", simulation)
 
 
 def push_start(simulation: RigSimulation, push: Push) -> tuple[HandPose, np.ndarray]:
