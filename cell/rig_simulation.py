@@ -80,7 +80,7 @@ class RigSimulation:
     Attributes:
         root: Context of the diagram.
         context: Context of the plant.
-        log: Every `RECORD_PERIOD`: poses, wrenches less their reading at the start.
+        log: Every `RECORD_PERIOD`: poses, and wrenches less their reading at `tare`.
         stepping_cpu: CPU seconds spent stepping so far.
     """
 
@@ -239,12 +239,19 @@ class RigSimulation:
             port.FixValue(self.context, forces)
             self._bed_pushes = bool(forces)
 
+    def tare(self) -> None:
+        """Take the present readings of both wrench sensors for zero."""
+        self._tare = self._tare + self._wrenches()
+
     def _wrenches(self) -> np.ndarray:
         readings = [sensor.read(self.context) for sensor in (self.rig.wrist, self.rig.force_plate)]
         return np.concatenate(readings) - self._tare
 
     def _record(self) -> None:
-        self._latest = self._wrenches()
+        wrenches = self._wrenches()
+        if self.rig.asleep:  # Nothing is felt of what sleeps: it weighs what it weighed.
+            wrenches[6:] = self._latest[6:]
+        self._latest = wrenches
         X_WJ, X_WP = self.X_WJ, self.X_WP
         p_JP = X_WJ.inverse() @ X_WP.translation()
         if not np.isfinite(p_JP).all():

@@ -36,7 +36,7 @@ FORMULA = (
 FORCES = (
     "The force plate's readings are less those at the start, with the jig at rest on it, and "
     "averaged over 10 ms. While the hand travels from placing to pushing, part and jig sleep: the "
-    "plate then reads what it read before."
+    "last reading then stands for theirs."
 )
 
 

@@ -169,6 +169,8 @@ def _place(simulation: RigSimulation, grasp: Grasp, trial: Trial, settle: float)
     rig = simulation.rig
     opening = tip_opening(grasp)
     simulation.begin("grip")
+    simulation.wait(REST_TIME / 3)
+    simulation.tare()
     simulation.jaws(opening, grasp.force)
     simulation.wait(GRIP_TIME)
     rig.let_part_go(simulation.root)
