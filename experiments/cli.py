@@ -181,6 +181,29 @@ class Push:
         return _run_experiment("push", self)
 
 
+@dataclass(frozen=True)
+class Regress:
+    """Run experiments with seed 0 and compare outcomes and metrics with the stored ones."""
+
+    suite: Literal["quick", "full"] = "quick"
+    """quick: three cases, minutes; full: every case three times."""
+
+    update: bool = False
+    """Store what comes out, and print what changes."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json``; return the exit code."""
+        config = self.common.load_config()
+        if self.common.seed != 0:
+            raise BadUsage("The stored metrics are those of --seed 0: leave it out.")
+        with output_folder(self.common.out) as out:
+            from experiments.regress import run_regress
+
+            return run_regress(self.suite, self.update, config, out, self.common.quiet)
+
+
 def _run_experiment(command: str, options: Place | Push) -> int:
     """Check everything that was asked for, then run it."""
     from experiments.case_results import Experiment
@@ -201,12 +224,13 @@ DESCRIPTION = """\
 A digital twin of a dual-arm assembly cell with a soft jig.
 Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
 """
-Command = Plan | Assemble | Place | Push
-COMMANDS: dict[str, type[Plan] | type[Assemble] | type[Place] | type[Push]] = {
+Command = Plan | Assemble | Place | Push | Regress
+COMMANDS: dict[str, type[Command]] = {
     "plan": Plan,
     "assemble": Assemble,
     "place": Place,
     "push": Push,
+    "regress": Regress,
 }
 
 
