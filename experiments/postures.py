@@ -90,15 +90,15 @@ def _grasp(
     return Grasp(name, jaw, RigidTransform(R_PJaw, np.array(at_mm) * MM), width_mm * MM, force)
 
 
-# The motor is held by its sides with a level hand, the recessed jaws above; the plate from above,
-# with the hand beyond the edge that lies across from the foot. Forces [A]: what a press of 20 N
-# off the pads' middle does not turn in the grip.
-MOTOR_LYING = _grasp("gearbox", "tip", (0, 0, -14), "-z", "+x", 36.8, 80.0)
-MOTOR_STANDING = _grasp("can", "tip", (0, 0, -33), "-y", "+x", 34.8, 80.0)
-PLATE_FOOT_UP = _grasp("edges", "wide", (0, 17, -2.5), "+z", "-x", 70.0, 100.0)
-PLATE_FOOT_DOWN = _grasp("edges", "wide", (0, 17, 7.5), "-z", "+x", 70.0, 100.0)
-PLATE_ON_FOOT = _grasp("edges", "wide", (0, 17, 2.5), "-y", "+x", 70.0, 60.0)
-PLATE_ON_SIDE = _grasp("face", "tip", (23, -8.8, 2.5), "-x", "+z", 5.0, 60.0)
+# The motor is held by its sides with a level hand, the recessed jaws above; the level plate from
+# above, close to its centre of mass, with the fingertips beyond the foot. The force is the most
+# that the gripper has: what is pressed off the pads' middle turns in a weaker grip.
+MOTOR_LYING = _grasp("gearbox", "tip", (0, 0, -14), "-z", "+x", 36.8, 65.0)
+MOTOR_STANDING = _grasp("can", "tip", (0, 0, -33), "-y", "+x", 34.8, 65.0)
+PLATE_FOOT_UP = _grasp("edges", "wide", (0, -21, -2.5), "+z", "+x", 70.0, 65.0)
+PLATE_FOOT_DOWN = _grasp("edges", "wide", (0, -21, 7.5), "-z", "-x", 70.0, 65.0)
+PLATE_ON_FOOT = _grasp("edges", "wide", (0, 17, 2.5), "-y", "+x", 70.0, 65.0)
+PLATE_ON_SIDE = _grasp("face", "tip", (23, -8.8, 2.5), "-x", "+z", 5.0, 65.0)
 
 POSTURES = {
     posture.label: posture
