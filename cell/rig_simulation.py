@@ -96,6 +96,7 @@ class RigSimulation:
         self.steps = 0
         self.pose = pose
         self._bed_pushes = False
+        self._recording = False
         self._record_every = max(1, round(RECORD_PERIOD / self.time_step))
         rig.reset(self.root, X_WJ, X_WP, rig.joints(pose))
         self.simulator.Initialize()
@@ -223,7 +224,7 @@ class RigSimulation:
             raise self._failure(f"solver failure: {str(error).splitlines()[0]}") from error
         if self.rig.soft_jig is not None:
             self._step_bag(self.rig.soft_jig)
-        if self.steps % self._record_every == 0:
+        if self._recording and self.steps % self._record_every == 0:
             self._record()
         self.stepping_cpu += time.process_time() - start
 
@@ -240,8 +241,9 @@ class RigSimulation:
             self._bed_pushes = bool(forces)
 
     def tare(self) -> None:
-        """Take the present readings of both wrench sensors for zero."""
+        """Take the present readings of both wrench sensors for zero; the log starts here."""
         self._tare = self._tare + self._wrenches()
+        self._recording = True
 
     def _wrenches(self) -> np.ndarray:
         readings = [sensor.read(self.context) for sensor in (self.rig.wrist, self.rig.force_plate)]
