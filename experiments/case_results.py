@@ -193,11 +193,14 @@ def case_table(command: str, results: Sequence[CaseResult]) -> Table:
     quantities = ("displacement_m", "push_shear_peak_N") if push else ("depth_m", "tilt_rad")
     headings = ("moved [mm]", "shear [N]") if push else ("depth [mm]", "tilt [deg]")
     scales = (1e3, 1.0) if push else (1e3, float(np.rad2deg(1.0)))
-    for heading in ("case", "successes", "paper", "as expected", *headings, "CPU [s] a trial"):
-        table.add_column(heading, justify="left" if heading in ("case", "paper") else "right")
+    for heading in ("case", "hits", "paper", "agrees", *headings, "CPU [s]"):
+        justify = "left" if heading in ("case", "paper") else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
     for result in results:
         values = [scale * result.values(q) for q, scale in zip(quantities, scales, strict=True)]
-        shown = [f"{v.mean():.1f} ± {v.std():.1f}" if len(v) else "" for v in values]
+        shown = [
+            f"{v.mean():.1f} ± {v.std():.1f}" if len(v) > 1 else f"{v.sum():.1f}" for v in values
+        ]
         cpu = np.mean([trial.trial.cpu_seconds for trial in result.trials])
         counts = f"{result.successes}/{len(result.trials)}"
         agrees = "yes" if result.agrees else "no"
