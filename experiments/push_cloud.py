@@ -32,7 +32,7 @@ from experiments.output import output_folder, write_json
 from experiments.place_push import cases_of
 from experiments.results import versions
 
-# Path in the configuration -> its range in the sources, for the table; cells of the cloud are ±10 %.
+# Path in the configuration -> its range in the sources, for the table; the cloud is ±10 %.
 PARAMETERS = {
     "push.jig_mass": "1 to 3 kg [A]",
     "push.base_friction": "0.3 to 0.6 [A]",
