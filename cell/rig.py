@@ -50,7 +50,7 @@ from cell.parts import LoosePart, add_parts
 from cell.paths import model_url, new_parser
 from cell.product import Product
 from cell.sensors import WrenchSensor
-from cell.soft_jig import SoftJig
+from cell.soft_jig import SoftJig, SurfaceSamples
 from cell.tools import Gripper, connect_gripper, set_gripper_gains
 
 # Drives of the carriage: stiffness, damping and largest effort [A], about those of a UR5e's hand:
@@ -110,6 +110,7 @@ class Rig:
         jig_base: The base, free on the force plate.
         soft_jig: The bag on it; None where a flat rigid block stands in its place.
         part: The part to place.
+        samples: Its surface, as the bag feels it.
         drive: Targets of the carriage: x, y, z [m], turn, tilt [rad].
         gripper: The hand's jaws.
         hand: Frame T between the tip pads.
@@ -125,6 +126,7 @@ class Rig:
     jig_base: RigidBody
     soft_jig: SoftJig | None
     part: LoosePart
+    samples: SurfaceSamples
     drive: Drive
     gripper: Gripper
     hand_length: float
@@ -237,6 +239,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str, bed: str = "
         jig_base=jig_base,
         soft_jig=soft_jig,
         part=parts[part],
+        samples=SurfaceSamples.of(part, product.parts[part].mesh),
         drive=drive,
         gripper=gripper,
         hand_length=float(X_MountT.translation()[2]),

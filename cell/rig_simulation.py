@@ -15,7 +15,7 @@ from cell.errors import CellError
 from cell.log import Log
 from cell.phase import PhaseFailed
 from cell.rig import HandPose, Rig
-from cell.soft_jig import JigState, SoftJig, SurfaceSamples
+from cell.soft_jig import JigState, SoftJig
 
 # A part this far below the top of the jig's base, or this far from its axis, has dropped off [m].
 DROPPED_BELOW, DROPPED_BESIDE = 0.02, 0.12
@@ -145,10 +145,10 @@ class RigSimulation:
 
     def press_with_part(self) -> None:
         """Let the bag go soft and carry the part by its real surface."""
-        jig, part = self.rig.soft_jig, self.rig.part.part
+        jig = self.rig.soft_jig
         if jig is not None:
             jig.soften(self.root)
-            jig.press_with(self.rig.part.body, SurfaceSamples.of(part.name, part.mesh))
+            jig.press_with(self.rig.part.body, self.rig.samples)
 
     def evacuate(self) -> None:
         """Start the pump, unless the configured vacuum is none at all: then the bag stays soft."""

@@ -124,6 +124,7 @@ def _case(result: CaseResult) -> dict[str, Any]:
         "part": case.posture.part,
         "posture": case.posture.name,
         **direction,
+        "meaning": _meaning(result),
         "trials": len(result.trials),
         "successes": result.successes,
         "expected": case.expected,

@@ -14,7 +14,6 @@ from cell.phase import PhaseFailed
 from cell.product import Grasp, Part
 from cell.rig import HandPose, Rig
 from cell.rig_simulation import RigSimulation
-from cell.soft_jig import SurfaceSamples
 from experiments.postures import AXES, MM, Posture, Push
 from experiments.reach import Fingers
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
@@ -240,9 +239,8 @@ def push_start(simulation: RigSimulation, push: Push) -> tuple[HandPose, np.ndar
     bed = bed_height(simulation, foot[:2])
     low = max(foot[2], bed)
     height = max(low + numbers.height_fraction * (top[2] - low), bed + numbers.bed_clearance)
-    samples = SurfaceSamples.of(rig.part.part.name, rig.part.part.mesh)
     fingers = Fingers.of_hand(rig)
-    travel = fingers.travel(X_WP @ samples.points.T, top[:2], height, direction)
+    travel = fingers.travel(X_WP @ rig.samples.points.T, top[:2], height, direction)
     p_WT = np.array([*top[:2], height + fingers.below_tip])
     p_WT += (travel - numbers.start_gap) * direction
     turn = float(np.arctan2(-direction[0], direction[1]))
