@@ -174,7 +174,7 @@ def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, qu
     now = metrics_of(run_suite(suite, config, console))
     rows = drifts(stored, now)
     shown = [row for row in rows if row.stored != row.now] if update else rows
-    console.print(drift_table(shown, "Changes" if update else "Drift"))
+    console.print(drift_table(shown, *(("Changes", "changed") if update else ("Drift", "drift"))))
     good = all(row.ok for row in rows)
     if update:
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -205,13 +205,13 @@ def _result(suite: str, success: bool, rows: Sequence[Drift], config: CellConfig
     }
 
 
-def drift_table(rows: Sequence[Drift], title: str) -> Table:
-    """Return one line per metric."""
+def drift_table(rows: Sequence[Drift], title: str, word: str) -> Table:
+    """Return one line per metric; those outside of their tolerance are marked with a word."""
     table = Table(title=title, title_justify="left")
     for heading in ("case", "metric", "stored", "now", "allowed", ""):
         table.add_column(heading, justify="left" if heading in ("case", "metric") else "right")
     for row in rows:
         allowed = max(row.tolerance.absolute, row.tolerance.relative * abs(row.stored or 0.0))
         values = ["-" if value is None else f"{value:.4g}" for value in (row.stored, row.now)]
-        table.add_row(row.case, row.metric, *values, f"{allowed:.2g}", "" if row.ok else "drift")
+        table.add_row(row.case, row.metric, *values, f"{allowed:.2g}", "" if row.ok else word)
     return table
