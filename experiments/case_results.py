@@ -199,11 +199,16 @@ def case_table(command: str, results: Sequence[CaseResult]) -> Table:
         table.add_column(heading, justify=justify, no_wrap=True)
     for result in results:
         values = [scale * result.values(q) for q, scale in zip(quantities, scales, strict=True)]
-        shown = [
-            f"{v.mean():.1f} ± {v.std():.1f}" if len(v) > 1 else f"{v.sum():.1f}" for v in values
-        ]
+        shown = [_spread(v) for v in values]
         cpu = np.mean([trial.trial.cpu_seconds for trial in result.trials])
         counts = f"{result.successes}/{len(result.trials)}"
         agrees = "yes" if result.agrees else "no"
         table.add_row(result.case.label, counts, result.case.expected, agrees, *shown, f"{cpu:.0f}")
     return table
+
+
+def _spread(values: np.ndarray) -> str:
+    """Return mean and standard deviation of some values, as far as there are any."""
+    if len(values) < 2:
+        return "".join(f"{value:.1f}" for value in values)
+    return f"{values.mean():.1f} ± {values.std(ddof=1):.1f}"
