@@ -5,13 +5,14 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 ARGS ?=
 
-.PHONY: help setup system run test test-slow check format models clean
+.PHONY: help setup system run test test-slow regress check format models clean
 
 help:
 	@echo "make setup      environment from the lock file, and what rendering needs of the system"
 	@echo "make run        set up, then assemble the motor unit in the twin; report in out/run (ARGS=... adds options)"
 	@echo "make test       set up, then run the fast tests"
 	@echo "make test-slow  long simulations"
+	@echo "make regress    the paper's experiments, quick suite, against stored metrics"
 	@echo "make check      style, types"
 	@echo "make format     rewrite the sources in the project's style"
 	@echo "make models     write the generated models again"
@@ -27,6 +28,9 @@ test: setup
 
 test-slow: $(INSTALLED)
 	$(BIN)/python -m pytest -n auto -m slow $(ARGS)
+
+regress: $(INSTALLED)
+	$(BIN)/soft-jig regress --out out/regress $(ARGS)
 
 check: $(INSTALLED)
 	$(BIN)/ruff check .

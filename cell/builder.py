@@ -108,7 +108,7 @@ def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> C
     Reset each Context with `Cell.reset` before it is stepped. The diagram owns all that it steps
     with; the cell is needed for handles only.
     """
-    plant, scene_graph = AddMultibodyPlant(_plant_config(config), builder)
+    plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
     plate_weld, jig_base = add_workcell(plant, config, product)
     left, right = add_arms(plant, config)
     parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
@@ -143,7 +143,8 @@ def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> C
     )
 
 
-def _plant_config(config: CellConfig) -> MultibodyPlantConfig:
+def plant_config(config: CellConfig) -> MultibodyPlantConfig:
+    """Return how the plant is stepped and what contact it has."""
     return MultibodyPlantConfig(
         time_step=config.simulation.time_step,
         discrete_contact_approximation=config.simulation.contact_approximation,

@@ -115,6 +115,43 @@ class PlacementConfig:
 
 
 @dataclass(frozen=True)
+class PushConfig:
+    """The paper's push experiment: one set of numbers for all cases and both parts."""
+
+    jig_mass: float = setting(
+        1.5, "kg", "Base and beads; not in the paper, range 1 to 3 [A].", above=0.45
+    )
+    base_friction: float = setting(
+        0.3, "", "Of the base on the force plate, range 0.3 to 0.6 [A].", above=0.0, at_most=2.0
+    )
+    speed: float = setting(
+        0.25, "m/s", "At the end of the push: coasting by 8 mm past 70 [S] asks for 0.22 to 0.28"
+        " [D].", above=0.0, at_most=1.0,
+    )  # fmt: skip
+    acceleration: float = setting(2.5, "m/s2", "Of the hand from rest [A].", above=0.0)
+    stroke: float = setting(0.070, "m", "Of the straight push [S].", above=0.0, at_most=0.15)
+    start_gap: float = setting(
+        2e-3, "m", "Between hand and part at the start [A].", at_least=0.0, at_most=0.02
+    )
+    height_fraction: float = setting(
+        0.6, "", "Lowest point of the fingers over the exposed height of the pushed face [A].",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    bed_clearance: float = setting(
+        2e-3, "m", "The fingers stay at least this far above the bed [A].", at_least=0.0
+    )
+    grasp_position_sigma: float = setting(
+        5e-4, "m", "Standard deviation of the part in the grasp, per axis [A].", at_least=0.0
+    )
+    grasp_angle_sigma_deg: float = setting(
+        1.0, "deg", "Standard deviation of the part in the grasp, per axis [A].", at_least=0.0
+    )
+    jig_position_sigma: float = setting(
+        1e-3, "m", "Standard deviation of the jig's place, along x and y [A].", at_least=0.0
+    )
+
+
+@dataclass(frozen=True)
 class MotionConfig:
     """Free motion of the arms."""
 
@@ -195,6 +232,7 @@ class CellConfig:
     driver: DriverConfig = DriverConfig()
     jig: JigParameters = JigParameters()
     placement: PlacementConfig = PlacementConfig()
+    push: PushConfig = PushConfig()
     motion: MotionConfig = MotionConfig()
     insertion: InsertionConfig = InsertionConfig()
     disturbance: DisturbanceConfig = DisturbanceConfig()

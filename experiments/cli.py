@@ -13,7 +13,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Literal
 
 import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, UseAppendAction, arg
@@ -129,11 +129,109 @@ class Assemble:
             )
 
 
+@dataclass(frozen=True)
+class Place:
+    """The paper's placement experiment: six postures, disturbed; upright and at rest counts."""
+
+    case: Annotated[str | None, arg(metavar="motor/P2")] = None
+    """A posture, or a part for all of its postures. Default: all six."""
+
+    trials: int = 10
+    """Trials of each case."""
+
+    hand: Literal["rig"] = "rig"
+    """What carries the gripper: a position-controlled rig."""
+
+    pressure: Annotated[float | None, arg(metavar="KPA")] = None
+    """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
+
+    bed: Literal["soft", "rigid"] = "soft"
+    """What the part is pressed on: the soft jig, or a flat rigid block in its place."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json`` and ``report.html``; return the exit code."""
+        return _run_experiment("place", self)
+
+
+@dataclass(frozen=True)
+class Push:
+    """The paper's push experiment: nine cases, 70 mm; the jig has to go along by 63 mm."""
+
+    case: Annotated[str | None, arg(metavar="motor/P2/a")] = None
+    """A case, or a part or posture for all of its cases. Default: all nine."""
+
+    trials: int = 5
+    """Trials of each case."""
+
+    hand: Literal["rig"] = "rig"
+    """What carries the gripper: a position-controlled rig."""
+
+    pressure: Annotated[float | None, arg(metavar="KPA")] = None
+    """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
+
+    bed: Literal["soft", "rigid"] = "soft"
+    """What the part is pressed on: the soft jig, or a flat rigid block in its place."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json`` and ``report.html``; return the exit code."""
+        return _run_experiment("push", self)
+
+
+@dataclass(frozen=True)
+class Regress:
+    """Run experiments with seed 0 and compare outcomes and metrics with the stored ones."""
+
+    suite: Literal["quick", "full"] = "quick"
+    """quick: three cases, minutes; full: every case three times."""
+
+    update: bool = False
+    """Store what comes out, and print what changes."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json``; return the exit code."""
+        config = self.common.load_config()
+        if self.common.seed != 0:
+            raise BadUsage("The stored metrics are those of --seed 0: leave it out.")
+        with output_folder(self.common.out) as out:
+            from experiments.regress import run_regress
+
+            return run_regress(self.suite, self.update, config, out, self.common.quiet)
+
+
+def _run_experiment(command: str, options: Place | Push) -> int:
+    """Check everything that was asked for, then run it."""
+    from experiments.case_results import Experiment
+    from experiments.place_push import cases_of, check_trials, run_experiment, with_pressure
+
+    common = options.common
+    config = with_pressure(common.load_config(), options.pressure)
+    check_trials(options.trials)
+    cases_of(command, options.case)
+    with output_folder(common.out) as out:
+        experiment = Experiment(
+            command, config, options.bed, options.trials, common.seed, out, common.quiet
+        )
+        return run_experiment(experiment, options.case)
+
+
 DESCRIPTION = """\
 A digital twin of a dual-arm assembly cell with a soft jig.
 Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
 """
-COMMANDS: dict[str, type[Plan] | type[Assemble]] = {"plan": Plan, "assemble": Assemble}
+Command = Plan | Assemble | Place | Push | Regress
+COMMANDS: dict[str, type[Command]] = {
+    "plan": Plan,
+    "assemble": Assemble,
+    "place": Place,
+    "push": Push,
+    "regress": Regress,
+}
 
 
 def split_order(text: str | None) -> tuple[str, ...] | None:
@@ -141,7 +239,7 @@ def split_order(text: str | None) -> tuple[str, ...] | None:
     return None if text is None else tuple(item.strip() for item in text.split(","))
 
 
-def parse(arguments: Sequence[str]) -> Plan | Assemble:
+def parse(arguments: Sequence[str]) -> Command:
     """Return the command that the arguments describe.
 
     Raises:

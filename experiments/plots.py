@@ -84,6 +84,11 @@ def _axes(x_label: str, y_label: str) -> tuple[Figure, Axes]:
 def _png(figure: Figure, axes: Axes) -> bytes:
     if axes.get_legend_handles_labels()[1]:
         axes.legend(fontsize=8, frameon=False)
+    return figure_png(figure)
+
+
+def figure_png(figure: Figure) -> bytes:
+    """Return a figure as a PNG."""
     buffer = io.BytesIO()
     FigureCanvasAgg(figure).print_png(buffer)
     return buffer.getvalue()

@@ -17,7 +17,9 @@ VERDICTS = ("success", "failure")
 SUMMARY = ("command", "product", "order", "seed", "real_time_factor")
 STEP_COLUMNS = ("name", "operation", "verdict", "sim_seconds", "cpu_seconds")
 PLAN_COLUMNS = ("target", "incoming", "directions", "posture", "fixed_part", "up", "cog_height_m")
-CASE_COLUMNS = ("part", "posture", "direction", "trials", "successes", "expected")
+CASE_COLUMNS = (
+    "part", "posture", "direction", "meaning", "trials", "successes", "expected", "verdict",
+)  # fmt: skip
 
 
 def write_report(

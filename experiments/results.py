@@ -91,15 +91,15 @@ def _summary(job: Job, fixing: FixingPlan, verdict: str) -> dict[str, Any]:
         "order": list(fixing.order),
         "seed": job.seed,
         "verdict": verdict,
-        "config": _finite(job.config.to_dict()),
+        "config": finite(job.config.to_dict()),
         "versions": versions(),
     }
 
 
-def _finite(value: Any) -> Any:
+def finite(value: Any) -> Any:
     """Return nested settings with infinity as text: JSON has no number for it."""
     if isinstance(value, dict):
-        return {key: _finite(item) for key, item in value.items()}
+        return {key: finite(item) for key, item in value.items()}
     return str(value) if isinstance(value, float) and not np.isfinite(value) else value
 
 

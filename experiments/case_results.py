@@ -1,0 +1,214 @@
+"""``result.json`` and ``report.html`` of the place and push experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+from scipy.stats import t as student
+from scipy.stats import ttest_ind
+
+from cell.config import CellConfig
+from experiments.case_plots import PAPER_MEANS, plot_forces, plot_quantity, plot_rates
+from experiments.cases import CaseResult
+from experiments.output import write_json
+from experiments.report import Picture, write_report
+from experiments.results import finite, versions
+
+ASSUMED = (
+    "The paper's figures of postures and push directions are not public as text: the pictures and "
+    "the table show how its words are read here. Postures, directions, push height and suction "
+    "were chosen with its outcome table known; no number differs between cases or parts."
+)
+HAND = (
+    "The hand is a closed parallel gripper with fingers and palm of assumed size, pushed so that "
+    "both fingertips' narrow sides lead; its palm overhangs them by 36 mm."
+)
+FORMULA = (
+    "The displacement is |dp_c|, how far the mean of the four screws moved. The formula printed in "
+    "the paper compares the screws with their own mean and is 0 for any pure translation, so it "
+    "cannot have given the paper's 78.2 mm; its value stands beside as printed_formula_m."
+)
+FORCES = (
+    "The force plate's readings are less those at the start, with the jig at rest on it, and "
+    "averaged over 10 ms. While the hand travels from placing to pushing, part and jig sleep: the "
+    "last reading then stands for theirs."
+)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What was asked for.
+
+    Attributes:
+        command: "place" or "push".
+        config: Every number.
+        bed: "soft" or "rigid".
+        trials: Of each case.
+        seed: Of the disturbances.
+        out: Existing folder for the results.
+        quiet: Whether to print nothing.
+    """
+
+    command: str
+    config: CellConfig
+    bed: str
+    trials: int
+    seed: int
+    out: Path
+    quiet: bool = False
+
+
+def verdict(results: Sequence[CaseResult]) -> str:
+    """Return "success" if every case came out as expected, else "failure"."""
+    return "success" if all(result.agrees for result in results) else "failure"
+
+
+def write_case_results(
+    experiment: Experiment, results: Sequence[CaseResult], pictures: Sequence[Picture], notes
+) -> None:
+    """Write result and report."""
+    for name in ("result.json", "report.html"):
+        (experiment.out / name).unlink(missing_ok=True)
+    result = summary(experiment, results)
+    push = experiment.command == "push"
+    said = [ASSUMED, *([HAND, FORMULA] if push else []), FORCES, *notes, *_failures(results)]
+    write_report(
+        experiment.out / "report.html",
+        title=f"Experiment: {experiment.command}",
+        plan={},
+        result=result,
+        pictures=pictures,
+        plots=_plots(results, push),
+        notes=said,
+    )
+    # Last: whoever finds it finds the rest, too.
+    write_json(experiment.out / "result.json", result)
+
+
+def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return what ``result.json`` holds."""
+    trials = [trial.trial for result in results for trial in result.trials]
+    simulated = sum(trial.sim_seconds for trial in trials)
+    spent = sum(trial.cpu_seconds for trial in trials)
+    return {
+        "command": experiment.command,
+        "product": "motor_unit",
+        "order": [],
+        "seed": experiment.seed,
+        "hand": "rig",
+        "bed": experiment.bed,
+        "verdict": verdict(results),
+        "cases": [_case(result) for result in results],
+        "displacement": displacement_statistics(results),
+        "real_time_factor": simulated / max(spent, 1e-9),
+        "cpu_seconds_per_trial": spent / max(len(trials), 1),
+        "config": finite(experiment.config.to_dict()),
+        "versions": versions(),
+    }
+
+
+def _case(result: CaseResult) -> dict[str, Any]:
+    case = result.case
+    direction = {} if case.push is None else {"direction": case.push.direction}
+    failures = [
+        {"trial": k, "phase": trial.failure[0], "evidence": trial.failure[1]}
+        for k, trial in enumerate(result.trials)
+        if trial.failure is not None
+    ]
+    return {
+        "part": case.posture.part,
+        "posture": case.posture.name,
+        **direction,
+        "meaning": _meaning(result),
+        "trials": len(result.trials),
+        "successes": result.successes,
+        "expected": case.expected,
+        "verdict": "success" if result.agrees else "failure",
+        "success_rate_interval": result.interval,
+        "measured": result.means(),
+        "each": [trial.measured | {"success": int(trial.success)} for trial in result.trials],
+        "failures": failures,
+    }
+
+
+def displacement_statistics(results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return means of successful and failed pushes, 95 % intervals, and Welch's test."""
+    groups = {"success": [], "failure": []}
+    for result in results:
+        for trial in result.trials:
+            if "displacement_m" in trial.measured:
+                outcome = "success" if trial.success else "failure"
+                groups[outcome].append(trial.measured["displacement_m"])
+    found: dict[str, Any] = {}
+    for outcome, values in groups.items():
+        if values:
+            found[outcome] = {"trials": len(values), "mean_m": float(np.mean(values))}
+            found[outcome]["paper_mean_m"] = PAPER_MEANS[outcome]
+        if len(values) > 1:
+            half = student.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values) ** 0.5
+            mean = found[outcome]["mean_m"]
+            found[outcome]["interval_m"] = [mean - float(half), mean + float(half)]
+    if all(len(values) > 1 and np.ptp(values) > 0 for values in groups.values()):
+        test = ttest_ind(groups["success"], groups["failure"], equal_var=False)
+        found["welch_p"] = float(np.asarray(test)[1])
+    return found
+
+
+def _failures(results: Sequence[CaseResult]) -> list[str]:
+    return [
+        f"{result.case.label}, trial {k}: stopped in '{trial.failure[0]}': {trial.failure[1]}"
+        for result in results
+        for k, trial in enumerate(result.trials)
+        if trial.failure is not None
+    ]
+
+
+def _plots(results: Sequence[CaseResult], push: bool) -> list[Picture]:
+    plots = [("Success rate, with Wilson's 95 % interval", plot_rates(results))]
+    if push:
+        shear = plot_quantity(results, "push_shear_peak_N", "largest shear force [N]", 1.0)
+        moved = plot_quantity(results, "displacement_m", "displacement of the jig [mm]", 1e3)
+        plots += [("Largest shear force while pushing", shear), ("Displacement", moved)]
+    else:
+        depth = plot_quantity(results, "depth_m", "depth below the apex [mm]", 1e3)
+        plots.append(("Depth of the lowest point", depth))
+    return plots + [
+        (f"{result.case.label}: {_meaning(result)}", plot_forces(result)) for result in results
+    ]
+
+
+def _meaning(result: CaseResult) -> str:
+    case = result.case
+    return case.posture.meaning + ("" if case.push is None else f", pushed {case.push.meaning}")
+
+
+def case_table(command: str, results: Sequence[CaseResult]) -> Table:
+    """Return the table a person reads: outcomes beside the paper's."""
+    push = command == "push"
+    table = Table(title=f"Experiment: {command}", title_justify="left")
+    quantities = ("displacement_m", "push_shear_peak_N") if push else ("depth_m", "tilt_rad")
+    headings = ("moved [mm]", "shear [N]") if push else ("depth [mm]", "tilt [deg]")
+    scales = (1e3, 1.0) if push else (1e3, float(np.rad2deg(1.0)))
+    for heading in ("case", "hits", "paper", "agrees", *headings, "CPU [s]"):
+        justify = "left" if heading in ("case", "paper") else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
+    for result in results:
+        values = [scale * result.values(q) for q, scale in zip(quantities, scales, strict=True)]
+        shown = [_spread(v) for v in values]
+        cpu = np.mean([trial.trial.cpu_seconds for trial in result.trials])
+        counts = f"{result.successes}/{len(result.trials)}"
+        agrees = "yes" if result.agrees else "no"
+        table.add_row(result.case.label, counts, result.case.expected, agrees, *shown, f"{cpu:.0f}")
+    return table
+
+
+def _spread(values: np.ndarray) -> str:
+    """Return mean and standard deviation of some values, as far as there are any."""
+    if len(values) < 2:
+        return "".join(f"{value:.1f}" for value in values)
+    return f"{values.mean():.1f} ± {values.std(ddof=1):.1f}"

@@ -1,0 +1,154 @@
+"""The paper's postures and push directions, in one table.
+
+The figures that define them are missing from the public text, so this is a reading of it, stated
+case by case; the report draws every one. P is the part's frame: the motor's has +z along the shaft
+and the shaft's eccentricity towards +y; the plate's has the hole's axis along z, the face between
+z = 0 (motor side) and 5 mm, and the foot at y = -33 .. -28 mm, reaching to z = -15 mm.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cell.errors import UnknownName
+from cell.product import Grasp
+
+MM = 1e-3
+AXES = {
+    sign + name: (1.0 if sign == "+" else -1.0) * np.eye(3)[k]
+    for k, name in enumerate("xyz")
+    for sign in "+-"
+}
+
+
+@dataclass(frozen=True)
+class Posture:
+    """How a part stands on the jig, and how the rig's hand brings it there.
+
+    Attributes:
+        part: "motor" or "plate".
+        name: The paper's label.
+        up: Axis of P that points up.
+        meaning: In words.
+        grasp: From above or from the side, by hand as in the paper.
+    """
+
+    part: str
+    name: str
+    up: str
+    meaning: str
+    grasp: Grasp
+
+    @property
+    def label(self) -> str:
+        """For example "motor/P2"."""
+        return f"{self.part}/{self.name}"
+
+
+@dataclass(frozen=True)
+class Push:
+    """A straight push of a part that the jig holds.
+
+    Attributes:
+        posture: How the part stands.
+        direction: The paper's label.
+        along: Direction of the push, an axis of P.
+        foot, top: Lower and upper end of the pushed face where the hand meets it, in P [mm].
+        expected: "success" or "failure", as in the paper.
+        meaning: In words.
+    """
+
+    posture: Posture
+    direction: str
+    along: str
+    foot: tuple[float, float, float]
+    top: tuple[float, float, float]
+    expected: str
+    meaning: str
+
+    @property
+    def label(self) -> str:
+        """For example "motor/P2/a"."""
+        return f"{self.posture.label}/{self.direction}"
+
+
+def _grasp(
+    name: str,
+    jaw: str,
+    at_mm: tuple[float, float, float],
+    approach: str,
+    closing: str,
+    width_mm: float,
+    force: float,
+) -> Grasp:
+    x, z = AXES[closing], AXES[approach]
+    R_PJaw = RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
+    return Grasp(name, jaw, RigidTransform(R_PJaw, np.array(at_mm) * MM), width_mm * MM, force)
+
+
+# The motor is held by its sides with a level hand, the recessed jaws above; the level plate from
+# above, close to its centre of mass, with the fingertips beyond the foot. The force is the most
+# that the gripper has: what is pressed off the pads' middle turns in a weaker grip.
+MOTOR_LYING = _grasp("gearbox", "tip", (0, 0, -14), "-z", "+x", 36.8, 65.0)
+MOTOR_STANDING = _grasp("can", "tip", (0, 0, -33), "-y", "+x", 34.8, 65.0)
+PLATE_FOOT_UP = _grasp("edges", "wide", (0, -21, -2.5), "+z", "+x", 70.0, 65.0)
+PLATE_FOOT_DOWN = _grasp("edges", "wide", (0, -21, 7.5), "-z", "-x", 70.0, 65.0)
+PLATE_ON_FOOT = _grasp("edges", "wide", (0, 17, 2.5), "-y", "+x", 70.0, 65.0)
+PLATE_ON_SIDE = _grasp("face", "tip", (23, -8.8, 2.5), "-x", "+z", 5.0, 65.0)
+
+POSTURES = {
+    posture.label: posture
+    for posture in (
+        Posture("motor", "P1", "-y", "lying on its side, shaft low", MOTOR_LYING),
+        Posture("motor", "P2", "+z", "standing on its terminals, shaft up", MOTOR_STANDING),
+        Posture("plate", "P1", "-z", "face level, motor side and foot up", PLATE_FOOT_UP),
+        Posture("plate", "P2", "+y", "standing on the foot's 70 x 20 face", PLATE_ON_FOOT),
+        Posture("plate", "P3", "+x", "standing on a side edge", PLATE_ON_SIDE),
+        Posture("plate", "P4", "+z", "face level, bolt side up, foot down", PLATE_FOOT_DOWN),
+    )
+}
+
+
+def _push(label: str, along: str, foot, top, expected: str, meaning: str) -> Push:
+    part, name, direction = label.split("/")
+    return Push(POSTURES[f"{part}/{name}"], direction, along, foot, top, expected, meaning)
+
+
+S, F = "success", "failure"
+PUSHES = {
+    push.label: push
+    for push in (
+        _push("motor/P1/a", "-z", (0, 18.4, 0), (0, -18.4, 0), S, "along the axis, on the gearbox"),
+        _push("motor/P1/b", "+x", (-18.4, 17.4, -25.7), (-18.4, -17.4, -25.7), S, "across"),
+        _push("motor/P2/a", "+x", (-17.4, 0, -53.4), (-18.4, 0, 0), F, "on the standing can"),
+        _push("plate/P1/a", "+y", (0, -33, 5), (0, -33, -15), S, "on the foot's outer face"),
+        _push("plate/P1/b", "+x", (-35, -30.5, 5), (-35, -30.5, -15), F, "on the foot's end"),
+        _push("plate/P1/c", "+x", (-35, -8.8, 5), (-35, -8.8, 0), S, "on the face's side edge"),
+        _push("plate/P2/a", "+z", (0, -28, 0), (0, 27, 0), F, "from the foot's side to the heel"),
+        _push("plate/P2/b", "-z", (0, -33, 5), (0, 27, 5), F, "from the front to the foot's toe"),
+        _push("plate/P2/c", "+x", (-35, -33, 2.5), (-35, 27, 2.5), S, "in the plane of the face"),
+    )
+}
+
+
+def chosen(kind: str, table: dict, case: str | None) -> list:
+    """Return the cases that a label names: one, all of a part or posture, or all of the table.
+
+    Raises:
+        UnknownName: Listing the known ones.
+    """
+    if case is None:
+        return list(table.values())
+    wanted = case.strip("/")
+    found = [item for label, item in table.items() if (label + "/").startswith(wanted + "/")]
+    if not found:
+        raise UnknownName(kind, case, _labels(table))
+    return found
+
+
+def _labels(table: Iterable[str]) -> list[str]:
+    return list(table)

@@ -1,0 +1,102 @@
+"""The place and push commands: what they refuse, what they write, what regress compares."""
+
+import json
+from pathlib import Path
+
+import pytest
+
+from cell import CellConfig
+from experiments.case_results import Experiment, displacement_statistics, verdict
+from experiments.cases import Case, CaseResult, TrialResult
+from experiments.cli import main
+from experiments.place_push import run_experiment
+from experiments.postures import POSTURES, PUSHES
+from experiments.regress import SUITES, TOLERANCES, drifts
+from experiments.rig_trial import Trial
+
+
+def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture) -> str:
+    out = tmp_path / "out"
+    assert main([*arguments, "--out", str(out)]) == 2
+    assert not out.exists()
+    (line,) = capsys.readouterr().err.strip().splitlines()
+    return line
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["push", "--case", "motor/P3/a"], "motor/P1/a, motor/P1/b"),
+        (["place", "--case", "shaft"], "motor/P1, motor/P2, plate/P1"),
+        (["place", "--case", "plate/P9"], "plate/P4"),
+        (["push", "--trials", "0"], "at least 1"),
+        (["place", "--trials", "-3"], "at least 1"),
+        (["push", "--pressure", "-5"], "between 0"),
+        (["push", "--pressure", "400"], "between 0"),
+        (["push", "--set", "jig.vacuum.pressure=9e9"], "between 0"),
+        (["push", "--set", "push.jig_mass=0.2"], "push.jig_mass"),
+        (["place", "--set", "jig.bag.cap_height=0.005"], "wide"),
+        (["regress", "--suite", "huge"], "huge"),
+    ],
+)
+def test_bad_input_is_one_line_and_writes_nothing(
+    arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    assert said in refused(arguments, tmp_path, capsys)
+
+
+def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:
+    """The motor on a rigid plate: a verdict with figures, exit code 1, and a whole report."""
+    experiment = Experiment("place", CellConfig(), "rigid", 1, 0, tmp_path, quiet=True)
+    assert run_experiment(experiment, "motor/P2") == 1
+    result = json.loads((tmp_path / "result.json").read_text())
+    (case,) = result["cases"]
+    assert result["verdict"] == "failure"
+    assert (case["part"], case["posture"]) == ("motor", "P2")
+    assert (case["trials"], case["successes"], case["expected"]) == (1, 0, "success")
+    assert case["measured"]["tilt_rad"] > 0.5
+    assert result["real_time_factor"] > 0
+    assert "force plate" in (tmp_path / "report.html").read_text()
+
+
+def case_with(label: str, displacements: list[float]) -> CaseResult:
+    push = PUSHES[label]
+    trials = [
+        TrialResult(d > 0.063, {"displacement_m": d}, None, Trial(planned=None))  # type: ignore
+        for d in displacements
+    ]
+    return CaseResult(Case(push.posture, push), trials)
+
+
+def test_verdict_is_that_every_case_is_as_expected() -> None:
+    good = [case_with("motor/P1/a", [0.07] * 5), case_with("motor/P2/a", [0.01] * 5)]
+    assert verdict(good) == "success"
+    assert verdict([case_with("motor/P2/a", [0.07, 0.07, 0.07, 0.01, 0.01])]) == "failure"
+
+
+def test_displacements_are_compared_by_outcome() -> None:
+    found = displacement_statistics(
+        [case_with("motor/P1/a", [0.076, 0.078, 0.080]), case_with("motor/P2/a", [0.02, 0.04])]
+    )
+    assert found["success"]["mean_m"] == pytest.approx(0.078)
+    assert found["failure"]["mean_m"] == pytest.approx(0.030)
+    low, high = found["success"]["interval_m"]
+    # Student's t for two degrees of freedom: 4.303 * 2 mm / sqrt(3).
+    assert (high - low) / 2 == pytest.approx(0.00497, abs=1e-5)
+    assert found["welch_p"] < 0.2
+
+
+def test_drift_is_a_metric_outside_of_its_tolerance_or_missing() -> None:
+    stored = {"place motor/P2": {"success_rate": 1.0, "depth_m": 0.0100}}
+    same = {"place motor/P2": {"success_rate": 1.0, "depth_m": 0.0103}}
+    assert all(row.ok for row in drifts(stored, same))
+    flipped = {"place motor/P2": {"success_rate": 0.0, "depth_m": 0.0100}}
+    assert [row.metric for row in drifts(stored, flipped) if not row.ok] == ["success_rate"]
+    assert not any(row.ok for row in drifts(stored, {}))
+
+
+def test_every_tolerance_has_a_reason_and_every_suite_known_cases() -> None:
+    assert all(len(tolerance.reason) > 20 for tolerance in TOLERANCES)
+    labels = {"place": POSTURES, "push": PUSHES}
+    for suite in SUITES.values():
+        assert all(label is None or label in labels[command] for command, label in suite.cases)
