@@ -10,6 +10,7 @@ from cell.loading import load_product
 from planning.fixing.explain import explanation, step_table, step_text, stop_text
 from planning.fixing.plan_file import save_plan
 from planning.fixing.planner import FixingPlan, plan
+from planning.ordering.explain import advice_text
 
 MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, also into a file.
 
@@ -49,5 +50,6 @@ def _print(fixing: FixingPlan, explain: bool) -> None:
     console.print(step_table(fixing))
     lines = [explanation(fixing)] if explain else [step_text(step) for step in fixing.steps]
     lines += [stop_text(fixing.stop)] if fixing.stop else []
+    lines += [advice_text(fixing.orders)] if fixing.orders else []
     for line in [*lines, f"Planned in {fixing.seconds:.2f} s."]:
         console.print(line, markup=False, soft_wrap=True)

@@ -16,6 +16,7 @@ from planning.fixing.algorithm import READING, FixingStep, Stop
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.interference import Blocker
 from planning.fixing.planner import FixingPlan
+from planning.ordering.advice_file import advice_from_dict, advice_to_dict
 
 
 def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
@@ -32,6 +33,7 @@ def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
         "steps": [_step_to_dict(step) for step in plan.steps],
         "stopped": _stop_to_dict(plan.stop) if plan.stop else None,
         "blockers": [_blocker_to_dict(blocker) for blocker in plan.blockers],
+        "orders": advice_to_dict(plan.orders) if plan.orders else None,
         "seconds": plan.seconds,
     }
 
@@ -49,6 +51,7 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
         steps=tuple(_step_from_dict(step) for step in data["steps"]),
         stop=_stop_from_dict(data["stopped"]) if data["stopped"] else None,
         seconds=data["seconds"],
+        orders=advice_from_dict(data["orders"]) if data["orders"] else None,
     )
 
 

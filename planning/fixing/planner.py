@@ -15,9 +15,10 @@ from planning.fixing.checks import without_overlaps
 from planning.fixing.contact import contact_matrix
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.interference import FIT_TOLERANCE, Blocker, interference
-from planning.fixing.order import check_order, default_order
+from planning.fixing.order import check_order
 from planning.fixing.reachability import reachable_matrices
 from planning.fixing.solids import solids_of
+from planning.ordering.advice import OrderAdvice, advise, fallback_order
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,8 @@ class FixingPlan:
         blockers: Evidence for every 0 of the M_j.
         steps: One per item that comes in, up to where Algorithm 1 stopped.
         stop: Why it stopped, or None if the order is feasible.
-        seconds: Time that planning took [s].
+        orders: The best orders there are; None where an order was asked for and is feasible.
+        seconds: Time that planning took [s], without that for the orders.
     """
 
     product: str
@@ -47,6 +49,7 @@ class FixingPlan:
     steps: tuple[FixingStep, ...]
     stop: Stop | None
     seconds: float
+    orders: OrderAdvice | None = None
 
     @property
     def feasible(self) -> bool:
@@ -61,7 +64,8 @@ def plan(
 
     Args:
         product: Parts in assembled poses.
-        order: Items in the order of assembly; None for the product's default.
+        order: Items in the order of assembly; None for the product's default, or the best there is
+            if it states none.
         tolerance: Interference that does not block a motion [m].
 
     Raises:
@@ -71,15 +75,19 @@ def plan(
     An order that is well formed but infeasible is an answer, not an error: see ``FixingPlan.stop``.
     """
     started = time.perf_counter()
-    order = default_order(product) if order is None else order
     _check(product, order)
     solids = without_overlaps(product, solids_of(product))
     contact = contact_matrix(list(solids.values()), product.contact_tolerance)
     leaving = interference(list(solids.values()), tolerance)
-    steps, stop = configure_fixing(product, order, Geometry(solids, contact, leaving))
+    geometry = Geometry(solids, contact, leaving)
+    advice = advise(product, geometry) if order is None else None
+    chosen = order or _chosen_order(product, geometry, advice)
+    steps, stop = configure_fixing(product, chosen, geometry)
+    if stop and (order or product.orders):
+        advice = advise(product, geometry, chosen)
     return FixingPlan(
         product=product.name,
-        order=order,
+        order=chosen,
         parts=tuple(product.parts),
         contact=contact,
         free=leaving.free,
@@ -87,13 +95,24 @@ def plan(
         blockers=leaving.blockers,
         steps=steps,
         stop=stop,
-        seconds=time.perf_counter() - started,
+        seconds=time.perf_counter() - started - (advice.seconds if advice else 0.0),
+        orders=advice,
     )
 
 
-def _check(product: Product, order: tuple[str, ...]) -> None:
+def _chosen_order(
+    product: Product, geometry: Geometry, advice: OrderAdvice | None
+) -> tuple[str, ...]:
+    if product.orders:
+        return product.orders[0]
+    if advice and advice.ranked:
+        return advice.ranked[0].order
+    return fallback_order(product, geometry)
+
+
+def _check(product: Product, order: tuple[str, ...] | None) -> None:
     if not product.parts:
         raise CellError(f"Product '{product.name}' has no parts.")
     if product.up not in DIRECTIONS:
         raise UnknownName("up axis", product.up, DIRECTIONS)
-    check_order(product, order)
+    check_order(product, order or (product.orders[0] if product.orders else product.items()))
