@@ -1,4 +1,4 @@
-"""Assemblies of many parts whose orders are known from how they are made. Lengths in millimetres."""
+"""Assemblies of many parts whose orders are known from how they are made. Lengths in mm."""
 
 from __future__ import annotations
 

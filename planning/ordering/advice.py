@@ -1,4 +1,4 @@
-"""What the planner says about orders: the best ones, the precedence graph, and why there is none."""
+"""What the planner says about orders: the best ones, what comes before what, or why none."""
 
 from __future__ import annotations
 
@@ -47,8 +47,8 @@ class OrderAdvice:
         exact: Whether none is better than the first of them, or, if there are none, whether that
             is proved.
         precedence: Arrows that hold in every feasible order that begins like the first one.
-        nearest: The feasible order with the fewest pairs of items exchanged against the order that
-            was asked for; empty if that was feasible, or nothing was asked for.
+        nearest: Of the orders found, that with the fewest pairs of items exchanged against the one
+            that was asked for; empty if that was feasible, or nothing was asked for.
         exchanged: How many pairs.
         interlock: Items that lock each other, if that is why there is no order.
         reason: Why there is no order; "" if there is one.
@@ -143,6 +143,10 @@ def _by_contact(items: Items, chosen: int) -> list[int]:
     return ordered
 
 
+def _touches(items: Items, item: int, others: list[int]) -> bool:
+    return bool(items.touching[item] & as_set(others))
+
+
 def _shape(solid: Solid) -> tuple[float, ...]:
     """Return what equal parts have in common, to a micrometre and a milligram."""
     size = sorted(round(float(edge), 6) for edge in solid.upper - solid.lower)
@@ -178,10 +182,9 @@ def _no_order(items: Items) -> str:
     """Return why there is no order although nothing is locked."""
     if not items.connected(items.everything):
         near = _by_contact(items, items.everything)
-        island = next(
-            i for n, i in enumerate(near) if n and not items.touching[i] & as_set(near[:n])
-        )
-        return f"{items.names[island]} is not connected with {items.names[near[0]]} by any contacts"
+        number = next(n for n in range(1, len(near)) if not _touches(items, near[n], near[:n]))
+        island, first = items.names[near[number]], items.names[near[0]]
+        return f"{island} is not connected with {first} by any contacts"
     if not any(items.whole):
         return "the parts of every item are loose, so none can be fixed first"
     return (

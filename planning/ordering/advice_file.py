@@ -13,7 +13,7 @@ from planning.ordering.separation import Interlock
 
 def advice_to_dict(advice: OrderAdvice) -> dict[str, Any]:
     """Return the advice as plain lists, numbers and strings; lengths in metres."""
-    data = asdict(advice) | {"objective": OBJECTIVE}
+    data: dict[str, Any] = {**asdict(advice), "objective": OBJECTIVE}
     for ranked in data["ranked"]:
         ranked["mean_cog_height_m"] = ranked.pop("mean_cog_height")
     return _lists(data)

@@ -7,8 +7,8 @@ apart hardly ever runs into a dead end, where putting together does all the time
 
 The cost of a step depends on the set and the item alone. So two ways to the same set are the same
 from then on, and only the ``keep`` cheapest are remembered: dynamic programming over sets, layer by
-layer. That is exact as long as the layers are small (``layer_width``); beyond that the cheapest sets
-of a layer go on, and the answer says that it is the best found instead of the best there is.
+layer. That is exact as long as the layers are small (``layer_width``); beyond that the cheapest
+sets of a layer go on, and the answer says that it is the best found, not the best there is.
 """
 
 from __future__ import annotations
