@@ -76,10 +76,8 @@ def plan(
     """
     started = time.perf_counter()
     _check(product, order)
-    solids = without_overlaps(product, solids_of(product))
-    contact = contact_matrix(list(solids.values()), product.contact_tolerance)
-    leaving = interference(list(solids.values()), tolerance)
-    geometry = Geometry(solids, contact, leaving)
+    geometry = geometry_of(product, tolerance)
+    contact, leaving = geometry.contact, geometry.interference
     advice = advise(product, geometry) if order is None else None
     chosen = order or _chosen_order(product, geometry, advice)
     steps, stop = configure_fixing(product, chosen, geometry)
@@ -98,6 +96,19 @@ def plan(
         seconds=time.perf_counter() - started - (advice.seconds if advice else 0.0),
         orders=advice,
     )
+
+
+def geometry_of(product: Product, tolerance: float = FIT_TOLERANCE) -> Geometry:
+    """Return contact and interference of a product's parts.
+
+    Args:
+        product: Parts in assembled poses.
+        tolerance: Interference that does not block a motion [m].
+    """
+    solids = without_overlaps(product, solids_of(product))
+    listed = list(solids.values())
+    contact = contact_matrix(listed, product.contact_tolerance)
+    return Geometry(solids, contact, interference(listed, tolerance))
 
 
 def _chosen_order(

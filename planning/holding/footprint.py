@@ -59,6 +59,12 @@ class Footprint:
         return Footprint(self.corners + by, np.column_stack([self.edges[:, :2], offsets]))
 
     @property
+    def narrowest(self) -> float:
+        """Smallest distance of two parallel lines around the outline [m]."""
+        depths = -(self.edges[:, :2] @ self.corners.T + self.edges[:, 2:]).min(axis=1)
+        return float(depths.min())
+
+    @property
     def circle(self) -> tuple[np.ndarray, float]:
         """Centre (2,) and diameter of the smallest circle around the outline [m]."""
         centre, radius = trimesh.nsphere.minimum_nsphere(self.corners)

@@ -1,0 +1,93 @@
+"""The general rule: which body the jig should hold in which posture, scored and explained.
+
+Algorithm 1 asks what can reach what, and for a low centre of gravity. A user wants to know more: so
+beside it every step's candidates are looked at one by one. The body on the jig is the target or the
+incoming item, and each of the six axes of the product may point up. A candidate that fails a test
+is rejected with the reason; the others are scored from 0 to 1 by
+
+    reach      1 if the moved part comes from above, 1/2 from the side
+    stability  angle by which the centre of gravity could lean, of 90 degrees; the lower of the body
+               alone and with the moved part on it
+    footprint  share of the bag's diameter that is left beside the footprint
+    imprint    share of the bag's depth that is left below the body
+    holding    m / (1 + m), m: force it bears across, per force that the operation exerts across
+    gripper    share of the gripper's stroke that is left over the widest of what must be gripped
+    continuity 1 if the jig holds the body in this posture already, or holds nothing yet
+
+and ranked by the mean. Equal weights: no source says otherwise, and the table shows them all.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from cell.product import Product
+from planning.fixing.algorithm import FixingStep, Geometry
+from planning.fixing.directions import DIRECTIONS, open_directions, opposite
+from planning.fixing.planner import FixingPlan
+from planning.holding.candidate import Candidate, Choice, Setup
+from planning.holding.examine import Examiner, Trial
+
+
+def general_rule(
+    product: Product, fixing: FixingPlan, geometry: Geometry, setup: Setup
+) -> tuple[Choice, ...]:
+    """Weigh the candidates of every step of a plan.
+
+    Args:
+        product: With grasps, fits and fasteners as far as they are known.
+        fixing: Its plan: the order and what Algorithm 1 chose.
+        geometry: Of the product's parts.
+        setup: The cell.
+    """
+    examiner = Examiner(product, geometry, setup)
+    return tuple(
+        _choice(examiner, step, first=number == 0) for number, step in enumerate(fixing.steps)
+    )
+
+
+def _choice(examiner: Examiner, step: FixingStep, first: bool) -> Choice:
+    leaving = open_directions(step.directions)
+    arriving = [opposite(j) for j in leaving]
+    trials = [
+        Trial(
+            body, moved, directions, up, not first and body is step.target and up == step.up, first
+        )
+        for body, moved, directions in (
+            (step.target, step.incoming, leaving),
+            (step.incoming, step.target, arriving),
+        )
+        for up in DIRECTIONS
+    ]
+    examined = [examiner.examine(trial) for trial in trials]
+    ranked = sorted(examined, key=lambda c: (bool(c.rejected), -c.score))
+    body = step.incoming if step.posture == opposite(step.up) else step.target
+    paper = next(k for k, c in enumerate(ranked) if c.body == body and c.up == step.up)
+    return Choice(step.item, tuple(ranked), paper, _verdict(ranked, paper))
+
+
+def _verdict(ranked: Sequence[Candidate], paper: int) -> str:
+    chosen, best = ranked[paper], ranked[0]
+    if best.rejected:
+        return f"No candidate passes; Algorithm 1 takes {label(chosen)}: {chosen.rejected}."
+    if paper == 0:
+        return f"Both rules take {label(best)} (score {best.score:.2f})."
+    if chosen.rejected:
+        why = f"which the general rule rejects: {chosen.rejected}"
+    else:
+        gains = {name: best.scores[name] - chosen.scores[name] for name in best.scores}
+        most = max(gains, key=gains.__getitem__)
+        why = (
+            f"score {chosen.score:.2f}; the difference is largest in {most} "
+            f"({best.scores[most]:.2f} against {chosen.scores[most]:.2f})"
+        )
+    return (
+        f"The rules disagree: the general rule prefers {label(best)} (score {best.score:.2f}), "
+        f"Algorithm 1 takes {label(chosen)}, {why}."
+    )
+
+
+def label(candidate: Candidate) -> str:
+    """Return a candidate's body and posture as words."""
+    names = candidate.body if len(candidate.body) <= 3 else (*candidate.body[:2], "...")
+    return f"{' + '.join(names)} with {candidate.up} up"
