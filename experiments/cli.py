@@ -75,18 +75,29 @@ class Plan:
     """Unit of mesh files; default mm."""
 
     explain: bool = False
-    """Also print which pair of parts blocks which direction, and where."""
+    """Also print the matrices, every candidate, and which pair blocks which direction, where."""
+
+    html: bool = True
+    """Write no plan.html, whose pictures take some seconds."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
     def run(self) -> int:
-        """Write ``plan.json``; return the exit code."""
-        self.common.load_config()
+        """Write ``plan.json``, ``matrices.npz`` and ``plan.html``; return the exit code."""
+        config = self.common.load_config()
         stdout = io.StringIO() if self.common.quiet else sys.stdout
         with output_folder(self.common.out) as out, contextlib.redirect_stdout(stdout):
             from experiments.plan_command import run_plan
 
-            return run_plan(self.product, split_order(self.order), self.units, self.explain, out)
+            return run_plan(
+                self.product,
+                split_order(self.order),
+                self.units,
+                self.explain,
+                out,
+                config=config,
+                html=self.html,
+            )
 
 
 @dataclass(frozen=True)

@@ -16,11 +16,11 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
     """Put stand-ins in the place of the two commands; return the calls that they get."""
     calls = []
 
-    def run_plan(product, order, units, explain, out):
+    def run_plan(product, order, units, explain, out, *, config, html):
         if order == ("unknown",):
             raise BadOrder("No such part.")
         print("a table")
-        calls.append(dict(product=product, order=order, units=units, explain=explain))
+        calls.append(dict(product=product, order=order, units=units, explain=explain, html=html))
         (out / "plan.json").write_text("{}")
         return 1 if product == "stuck" else 0
 
@@ -38,7 +38,10 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
 def test_plan_gets_its_options(calls: list[dict], tmp_path: Path) -> None:
     options = ["--order", "a,b", "--units", "in", "--explain", "--out", str(tmp_path)]
     assert main(["plan", "folder", *options]) == 0
-    assert calls == [dict(product="folder", order=("a", "b"), units="in", explain=True)]
+    expected = dict(product="folder", order=("a", "b"), units="in", explain=True, html=True)
+    assert calls == [expected]
+    assert main(["plan", "folder", *options, "--no-html"]) == 0
+    assert calls == [expected, expected | dict(html=False)]
     assert (tmp_path / "plan.json").exists()
 
 

@@ -29,7 +29,7 @@ SETUP = Setup.of(CellConfig.load())
 
 
 def choices(product: Product, order: tuple[str, ...] | None = None) -> tuple[Choice, ...]:
-    return general_rule(product, plan(product, order), geometry_of(product), SETUP)
+    return general_rule(product, plan(product, order), SETUP)
 
 
 def candidate(choice: Choice, body: str, up: str) -> Candidate:

@@ -55,13 +55,18 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
     )
 
 
-def save_plan(plan: FixingPlan, file: Path) -> None:
-    """Write a plan; the file appears only when it is complete."""
+def save_plan(plan: FixingPlan, file: Path, **sections: Any) -> None:
+    """Write a plan; the file appears only when it is complete.
+
+    Args:
+        plan: The plan.
+        file: ``plan.json``.
+        sections: More of it, plain values by name, which ``load_plan`` leaves alone.
+    """
     partial = file.with_name(file.name + ".part")
     # One line per key: a matrix row on a line each would run to 100 000 lines for 100 parts.
-    lines = [
-        f" {json.dumps(key)}: {json.dumps(value)}" for key, value in plan_to_dict(plan).items()
-    ]
+    data = plan_to_dict(plan) | sections
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items()]
     partial.write_text("{\n" + ",\n".join(lines) + "\n}\n")
     os.replace(partial, file)
 

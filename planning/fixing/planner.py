@@ -37,6 +37,7 @@ class FixingPlan:
         stop: Why it stopped, or None if the order is feasible.
         orders: The best orders there are; None where an order was asked for and is feasible.
         seconds: Time that planning took [s], without that for the orders.
+        geometry: What the decisions rest on; None for a plan that was read from a file.
     """
 
     product: str
@@ -50,6 +51,7 @@ class FixingPlan:
     stop: Stop | None
     seconds: float
     orders: OrderAdvice | None = None
+    geometry: Geometry | None = None
 
     @property
     def feasible(self) -> bool:
@@ -95,6 +97,7 @@ def plan(
         stop=stop,
         seconds=time.perf_counter() - started - (advice.seconds if advice else 0.0),
         orders=advice,
+        geometry=geometry,
     )
 
 

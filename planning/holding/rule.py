@@ -22,25 +22,24 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from cell.product import Product
-from planning.fixing.algorithm import FixingStep, Geometry
+from planning.fixing.algorithm import FixingStep
 from planning.fixing.directions import DIRECTIONS, open_directions, opposite
 from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import Candidate, Choice, Setup
 from planning.holding.examine import Examiner, Trial
 
 
-def general_rule(
-    product: Product, fixing: FixingPlan, geometry: Geometry, setup: Setup
-) -> tuple[Choice, ...]:
+def general_rule(product: Product, fixing: FixingPlan, setup: Setup) -> tuple[Choice, ...]:
     """Weigh the candidates of every step of a plan.
 
     Args:
         product: With grasps, fits and fasteners as far as they are known.
-        fixing: Its plan: the order and what Algorithm 1 chose.
-        geometry: Of the product's parts.
+        fixing: Its plan, made now and not read from a file: the order, what Algorithm 1 chose, and
+            the geometry.
         setup: The cell.
     """
-    examiner = Examiner(product, geometry, setup)
+    assert fixing.geometry is not None
+    examiner = Examiner(product, fixing.geometry, setup)
     return tuple(
         _choice(examiner, step, first=number == 0) for number, step in enumerate(fixing.steps)
     )
