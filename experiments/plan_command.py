@@ -16,6 +16,7 @@ from planning.fixing.directions import DIRECTIONS
 from planning.fixing.explain import explanation, step_table, step_text, stop_text
 from planning.fixing.plan_file import save_plan
 from planning.fixing.planner import FixingPlan, plan
+from planning.fixing.remark import bolt_remarks
 from planning.holding.candidate import Choice, Setup
 from planning.holding.choice_file import choices_text, choices_to_list
 from planning.holding.rule import general_rule
@@ -63,9 +64,12 @@ def run_plan(
     (out / "plan.html").unlink(missing_ok=True)  # An earlier plan's page is not this one's.
     save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
     save_matrices(fixing, out / "matrices.npz")
+    assert fixing.geometry is not None
+    notes = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
     if html:
-        seconds["plan.html"] = write_page(out / "plan.html", described, fixing, choices, setup)
-    _print(fixing, choices, explain, seconds)
+        page = out / "plan.html"
+        seconds["plan.html"] = write_page(page, described, fixing, choices, setup, notes)
+    _print(fixing, choices, explain, notes, seconds)
     return 0 if fixing.feasible else 1
 
 
@@ -82,7 +86,11 @@ def save_matrices(fixing: FixingPlan, file: Path) -> None:
 
 
 def _print(
-    fixing: FixingPlan, choices: tuple[Choice, ...], explain: bool, seconds: dict[str, float]
+    fixing: FixingPlan,
+    choices: tuple[Choice, ...],
+    explain: bool,
+    notes: list[str],
+    seconds: dict[str, float],
 ) -> None:
     console = Console(highlight=False)
     console.width = max(console.width, MIN_WIDTH)
@@ -94,6 +102,7 @@ def _print(
         lines += ["Candidates, by the general rule:\n" + choices_text(choices)]
     else:
         lines += [f"{c.item}: {c.verdict}" for c in choices if not c.agrees]
+    lines += notes
     apart = ", ".join(f"{name} {time:.2f} s" for name, time in seconds.items())
     for line in [*lines, f"Planned in {fixing.seconds:.2f} s; {apart}."]:
         console.print(line, markup=False, soft_wrap=True)

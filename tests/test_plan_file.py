@@ -137,3 +137,21 @@ def test_command_names_the_nearest_order(capsys, tmp_path):
     assert "Infeasible: plate cannot be added to motor, bolt_1" in text
     assert "+z: plate hits bolt_1 at (" in text
     assert "Nearest feasible order: motor,plate,bolts (1 pair of items exchanged)." in text
+
+
+def test_command_writes_candidates_and_matrices_beside_the_plan(monkeypatch, capsys, tmp_path):
+    (tmp_path / "plan.html").write_text("of an earlier plan")
+    run(monkeypatch, capsys, tube_and_pins(), tmp_path)
+    assert {file.name for file in tmp_path.iterdir()} == {"plan.json", "matrices.npz"}
+    (choice,) = json.loads((tmp_path / "plan.json").read_text())["general_rule"]
+    assert choice["item"] == "pins" and choice["agrees"] is True
+    assert len(choice["candidates"]) == 12
+    chosen = choice["candidates"][choice["algorithm_1"]]
+    assert (chosen["body"], chosen["up"]) == (["plate"], "+z")
+    assert all(one["rejected"] or one["scores"] for one in choice["candidates"])
+
+
+def test_command_prints_every_candidate_on_request(monkeypatch, capsys, tmp_path):
+    _, text, _ = run(monkeypatch, capsys, tube_and_pins(), tmp_path, explain=True)
+    assert "Candidates, by the general rule:" in text
+    assert "pins with -z up: no, " in text and "holding 0." in text

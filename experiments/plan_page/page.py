@@ -20,7 +20,6 @@ from planning.fixing.explain import blocker_text, step_text, stop_text
 from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import Candidate, Choice, Setup
 from planning.holding.footprint import USUAL_DEPTH
-from planning.holding.rule import label
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.explain import advice_text, arrow_text
 
@@ -130,26 +129,37 @@ def _figure(shown: Sequence[Shown], caption: str) -> str:
 
 
 def _choice(choice: Choice) -> str:
-    rows = [_row(number, c, choice) for number, c in enumerate(choice.candidates, start=1)]
-    columns = list(dict.fromkeys(key for row in rows for key in row))
-    order = [c for c in columns if c != "why not, or what to provide for"]
-    listed = table(rows, [*order, "why not, or what to provide for"])
+    passed = [_row(number, c, choice) for number, c in enumerate(choice.candidates, start=1)
+              if not c.rejected]  # fmt: skip
+    rejected = [c for c in choice.candidates if c.rejected]
+    reasons = "".join(
+        f"<li>{escape(c.label)}{_by_paper(choice, c)}: {escape(c.rejected)}</li>" for c in rejected
+    )
     kind = "agree" if choice.agrees else "differ"
-    return f'<p class="{kind}"><b>General rule:</b> {escape(choice.verdict)}</p>{listed}'
+    return (
+        f'<p class="{kind}"><b>General rule:</b> {escape(choice.verdict)}</p>'
+        f"{table(passed, list(passed[0])) if passed else ''}"
+        f"<details><summary>{len(rejected)} rejected</summary><ul>{reasons}</ul></details>"
+    )
 
 
 def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]:
-    paper = " (Algorithm 1)" if number - 1 == choice.paper else ""
-    row: dict[str, Any] = {
+    return {
         "": number,
-        "on the jig": f"{label(candidate)}{paper}",
+        "on the jig": candidate.label + _by_paper(choice, candidate),
         "from": candidate.approach,
+        "score": round(candidate.score, 2),
+        **{name: round(value, 2) for name, value in candidate.scores.items()},
+        "bears / pushed across [N]": (
+            f"{candidate.figures['bears_across_N']:.1f} / "
+            f"{candidate.figures['pushed_across_N']:.1f}"
+        ),
+        "to provide for": "; ".join(candidate.notes),
     }
-    if not candidate.rejected:
-        row["score"] = round(candidate.score, 2)
-        row |= {name: round(value, 2) for name, value in candidate.scores.items()}
-    row["why not, or what to provide for"] = candidate.rejected or "; ".join(candidate.notes)
-    return row
+
+
+def _by_paper(choice: Choice, candidate: Candidate) -> str:
+    return " (Algorithm 1)" if candidate is choice.candidates[choice.paper] else ""
 
 
 def _matrices(plan: FixingPlan) -> str:

@@ -81,7 +81,7 @@ def view_of(meshes: Iterable[trimesh.Trimesh]) -> View:
     points = np.concatenate([mesh.bounds for mesh in meshes])
     low, high = points.min(axis=0), points.max(axis=0)
     centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
-    distance = 0.95 * radius / np.sin(np.deg2rad(FIELD_OF_VIEW / 2))
+    distance = 1.02 * radius / np.sin(np.deg2rad(FIELD_OF_VIEW / 2))
     eye = centre + distance * TOWARDS / np.linalg.norm(TOWARDS)
     return View(
         (float(eye[0]), float(eye[1]), float(eye[2])),

@@ -41,7 +41,8 @@ class Candidate:
     """One way to hold the product for a step.
 
     Attributes:
-        body: Names of the parts that the jig holds.
+        name: Items that the jig holds, as words.
+        body: Names of their parts.
         moved: Names of the parts that are brought to them.
         up: Axis of the product frame that points up on the jig.
         approach: Where the moved parts come from, seen on the jig: "above", "the side" or "below".
@@ -51,6 +52,7 @@ class Candidate:
         notes: What has to be provided for.
     """
 
+    name: str
     body: tuple[str, ...]
     moved: tuple[str, ...]
     up: str
@@ -59,6 +61,11 @@ class Candidate:
     scores: Mapping[str, float]
     rejected: str
     notes: tuple[str, ...] = ()
+
+    @property
+    def label(self) -> str:
+        """Body and posture as words."""
+        return f"{self.name} with {self.up} up"
 
     @property
     def score(self) -> float:

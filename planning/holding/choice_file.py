@@ -7,7 +7,6 @@ from dataclasses import asdict
 from typing import Any
 
 from planning.holding.candidate import Candidate, Choice
-from planning.holding.rule import label
 
 
 def choices_to_list(choices: Sequence[Choice]) -> list[dict[str, Any]]:
@@ -43,7 +42,7 @@ def choices_text(choices: Sequence[Choice]) -> str:
 
 def _line(candidate: Candidate) -> str:
     if candidate.rejected:
-        return f"    {label(candidate)}: no, {candidate.rejected}"
+        return f"    {candidate.label}: no, {candidate.rejected}"
     scores = ", ".join(f"{name} {value:.2f}" for name, value in candidate.scores.items())
     notes = "".join(f"; {note}" for note in candidate.notes)
-    return f"    {label(candidate)}: {candidate.score:.2f} ({scores}){notes}"
+    return f"    {candidate.label}: {candidate.score:.2f} ({scores}){notes}"

@@ -36,7 +36,8 @@ class Trial:
     """A candidate before it is looked at.
 
     Attributes:
-        body: Names of the parts on the jig.
+        name: Items on the jig, as words.
+        body: Names of their parts.
         moved: Names of the parts that are brought to them.
         directions: Along which the moved parts leave the body.
         up: Axis of the product frame that points up.
@@ -44,6 +45,7 @@ class Trial:
         bare: Whether the jig holds nothing yet.
     """
 
+    name: str
     body: tuple[str, ...]
     moved: tuple[str, ...]
     directions: Sequence[str]
@@ -73,7 +75,15 @@ class Examiner:
         except Rejected as reason:
             rejected = str(reason)
         return Candidate(
-            trial.body, trial.moved, trial.up, approach, figures, scores, rejected, tuple(notes)
+            trial.name,
+            trial.body,
+            trial.moved,
+            trial.up,
+            approach,
+            figures,
+            scores,
+            rejected,
+            tuple(notes),
         )
 
     def _scores(

@@ -14,6 +14,7 @@ from functools import cache
 
 import numpy as np
 import trimesh
+from scipy import ndimage
 
 from cell.soft_jig import JigParameters, SurfaceSamples
 from cell.soft_jig.bed import Bed
@@ -23,6 +24,7 @@ from planning.holding.footprint import Footprint, footprint
 CELL = 0.002  # [m] [D] 60 cells across: depths within 0.5 mm of those on the default 1.5 mm.
 STEP = 0.0005  # [m] Between two looks at the force.
 SPACING = 0.0005  # [m] [D] 16 points per cell, so that hardly any cell under a body gets none.
+NARROW = 0.008  # [m] [A] Beads of 1 mm under a membrane of 1 mm do not rise into such a hole.
 FEWEST = 500  # Points of a small part.
 SPEED = 0.010  # [m/s] [A] of the hand; the bed hardly depends on it.
 
@@ -92,7 +94,9 @@ def depth_in_bed(
     half = (len(imprint.bed) - 1) // 2
     at = np.rint(points[:, :2] / imprint.cell).astype(int) + half
     inside = np.all((at >= 0) & (at < len(imprint.bed)), axis=1)
-    bed, under = (height[tuple(at[inside].T)] for height in (imprint.bed, imprint.under))
+    # The height field stands up in every hole of the body; a bag does not enter narrow ones.
+    bulging = ndimage.grey_opening(imprint.bed, size=round(NARROW / imprint.cell))
+    bed, under = (height[tuple(at[inside].T)] for height in (bulging, imprint.under))
     below = np.minimum(bed, under) - points[inside, 2]  # Above the body there is no bed.
     return float(np.max(below, initial=0.0))
 

@@ -41,20 +41,23 @@ def general_rule(product: Product, fixing: FixingPlan, setup: Setup) -> tuple[Ch
     assert fixing.geometry is not None
     examiner = Examiner(product, fixing.geometry, setup)
     return tuple(
-        _choice(examiner, step, first=number == 0) for number, step in enumerate(fixing.steps)
+        _choice(examiner, step, fixing.order[: number + 1])
+        for number, step in enumerate(fixing.steps)
     )
 
 
-def _choice(examiner: Examiner, step: FixingStep, first: bool) -> Choice:
+def _choice(examiner: Examiner, step: FixingStep, there: tuple[str, ...]) -> Choice:
+    """Weigh the candidates of one step, before which some items of the order are there."""
+    bare, together = len(there) == 1, " + ".join(there)
     leaving = open_directions(step.directions)
     arriving = [opposite(j) for j in leaving]
     trials = [
         Trial(
-            body, moved, directions, up, not first and body is step.target and up == step.up, first
+            name, body, moved, directions, up, not bare and name == together and up == step.up, bare
         )
-        for body, moved, directions in (
-            (step.target, step.incoming, leaving),
-            (step.incoming, step.target, arriving),
+        for name, body, moved, directions in (
+            (together, step.target, step.incoming, leaving),
+            (step.item, step.incoming, step.target, arriving),
         )
         for up in DIRECTIONS
     ]
@@ -68,9 +71,9 @@ def _choice(examiner: Examiner, step: FixingStep, first: bool) -> Choice:
 def _verdict(ranked: Sequence[Candidate], paper: int) -> str:
     chosen, best = ranked[paper], ranked[0]
     if best.rejected:
-        return f"No candidate passes; Algorithm 1 takes {label(chosen)}: {chosen.rejected}."
+        return f"No candidate passes; Algorithm 1 takes {chosen.label}: {chosen.rejected}."
     if paper == 0:
-        return f"Both rules take {label(best)} (score {best.score:.2f})."
+        return f"Both rules take {best.label} (score {best.score:.2f})."
     if chosen.rejected:
         why = f"which the general rule rejects: {chosen.rejected}"
     else:
@@ -81,12 +84,6 @@ def _verdict(ranked: Sequence[Candidate], paper: int) -> str:
             f"({best.scores[most]:.2f} against {chosen.scores[most]:.2f})"
         )
     return (
-        f"The rules disagree: the general rule prefers {label(best)} (score {best.score:.2f}), "
-        f"Algorithm 1 takes {label(chosen)}, {why}."
+        f"The rules disagree: the general rule prefers {best.label} (score {best.score:.2f}), "
+        f"Algorithm 1 takes {chosen.label}, {why}."
     )
-
-
-def label(candidate: Candidate) -> str:
-    """Return a candidate's body and posture as words."""
-    names = candidate.body if len(candidate.body) <= 3 else (*candidate.body[:2], "...")
-    return f"{' + '.join(names)} with {candidate.up} up"
