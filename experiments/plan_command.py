@@ -54,22 +54,22 @@ def run_plan(
     """
     described = load_product(product, units=units)
     fixing = plan(described, order)
-    setup = Setup.of(config or CellConfig())
-    started = time.perf_counter()
+    assert fixing.geometry is not None
+    console = _console()
+    _print_plan(console, fixing, explain)
+    setup, started = Setup.of(config or CellConfig()), time.perf_counter()
     choices = general_rule(described, fixing, setup)
     seconds = {"general rule": time.perf_counter() - started}
-    if fixing.orders:
-        seconds["orders"] = fixing.orders.seconds
+    remarks = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
     out.mkdir(parents=True, exist_ok=True)
-    (out / "plan.html").unlink(missing_ok=True)  # An earlier plan's page is not this one's.
+    page = out / "plan.html"
+    page.unlink(missing_ok=True)  # An earlier plan's page is not this one's.
     save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
     save_matrices(fixing, out / "matrices.npz")
-    assert fixing.geometry is not None
-    notes = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
     if html:
-        page = out / "plan.html"
-        seconds["plan.html"] = write_page(page, described, fixing, choices, setup, notes)
-    _print(fixing, choices, explain, notes, seconds)
+        seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
+    _print_rule(console, choices, explain, remarks)
+    _print_times(console, fixing, seconds)
     return 0 if fixing.feasible else 1
 
 
@@ -85,24 +85,37 @@ def save_matrices(fixing: FixingPlan, file: Path) -> None:
     write_arrays(file, arrays)
 
 
-def _print(
-    fixing: FixingPlan,
-    choices: tuple[Choice, ...],
-    explain: bool,
-    notes: list[str],
-    seconds: dict[str, float],
-) -> None:
+def _console() -> Console:
     console = Console(highlight=False)
     console.width = max(console.width, MIN_WIDTH)
+    return console
+
+
+def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
     console.print(step_table(fixing))
     lines = [explanation(fixing)] if explain else [step_text(step) for step in fixing.steps]
     lines += [stop_text(fixing.stop)] if fixing.stop else []
     lines += [advice_text(fixing.orders)] if fixing.orders else []
+    _print_lines(console, lines)
+
+
+def _print_rule(
+    console: Console, choices: tuple[Choice, ...], explain: bool, remarks: list[str]
+) -> None:
     if explain and choices:
-        lines += ["Candidates, by the general rule:\n" + choices_text(choices)]
+        lines = ["Candidates, by the general rule:\n" + choices_text(choices)]
     else:
-        lines += [f"{c.item}: {c.verdict}" for c in choices if not c.agrees]
-    lines += notes
-    apart = ", ".join(f"{name} {time:.2f} s" for name, time in seconds.items())
-    for line in [*lines, f"Planned in {fixing.seconds:.2f} s; {apart}."]:
+        lines = [f"{choice.item}: {choice.verdict}" for choice in choices if not choice.agrees]
+    _print_lines(console, lines + remarks)
+
+
+def _print_times(console: Console, fixing: FixingPlan, seconds: dict[str, float]) -> None:
+    if fixing.orders:
+        seconds = {"orders": fixing.orders.seconds} | seconds
+    apart = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
+    _print_lines(console, [f"Planned in {fixing.seconds:.2f} s; {apart}."])
+
+
+def _print_lines(console: Console, lines: list[str]) -> None:
+    for line in lines:
         console.print(line, markup=False, soft_wrap=True)

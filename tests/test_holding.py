@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -194,9 +195,11 @@ def test_rules_agree_on_the_motor_unit(order):
 def test_reasons_to_reject_on_the_motor_unit():
     first, second = choices(load_product("motor_unit"), ("motor", "plate", "bolts"))
     assert "from below" in candidate(first, "motor", "-z").rejected
-    # The shaft sticks out 17 mm under the plate; the plate sinks 5 mm.
-    assert "motor would end 2" in candidate(first, "plate", "-z").rejected
-    assert "inside the frozen bed" in candidate(first, "plate", "-z").rejected
+    # The shaft sticks out 17 mm under the plate, and the bag stands a little into the hole.
+    inside = re.fullmatch(
+        r"motor would end (\d+) mm inside the frozen bed", candidate(first, "plate", "-z").rejected
+    )
+    assert inside and 16 <= int(inside[1]) <= 23
     assert "do not hang together" in candidate(second, "bolt_1", "-z").rejected
     best = second.candidates[0]
     assert "0.50 N m" in best.notes[0]  # The left hand has to hold it: the base does not.

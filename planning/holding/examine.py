@@ -61,7 +61,7 @@ class Examiner:
         self.product, self.geometry, self.setup = product, geometry, setup
         self.gravity = Gravity(product, geometry)
         self._samples: dict[str, SurfaceSamples] = {}
-        self._imprints: dict[tuple[tuple[str, ...], str], Imprint] = {}
+        self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
 
     def examine(self, trial: Trial) -> Candidate:
         """Run the tests and return the candidate with figures, and scores or the reason."""
@@ -149,12 +149,13 @@ class Examiner:
         return diameter
 
     def _imprint(self, trial: Trial, R_JA: np.ndarray, figures: dict[str, float]) -> Imprint:
-        """Press the body into the bed, its centre of gravity over the middle."""
-        key = trial.body, trial.up
+        """Press the body into the bed; what is added far above the bed changes nothing."""
+        middle, low = self._place(trial, R_JA)
+        reach = low + self.setup.jig.bag.cap_height
+        reaching = tuple(n for n in trial.body if self._lowest((n,), R_JA) <= reach)
+        key = reaching, trial.up, middle.tobytes()
         if key not in self._imprints:
-            middle, low = self._place(trial, R_JA)
-            reach = low + self.setup.jig.bag.cap_height
-            parts = [self._sampled(n) for n in trial.body if self._lowest((n,), R_JA) <= reach]
+            parts = [self._sampled(name) for name in reaching]
             self._imprints[key] = press(parts, R_JA, middle, self.setup.jig, self.setup.press_force)
         imprint = self._imprints[key]
         figures["depth_m"], figures["imprint_volume_m3"] = imprint.depth, imprint.volume
@@ -189,9 +190,12 @@ class Examiner:
                 raise Rejected(f"{name} would end {1e3 * depth:.0f} mm inside the frozen bed")
 
     def _place(self, trial: Trial, R_JA: np.ndarray) -> tuple[np.ndarray, float]:
-        """Return the point (2,) of the body over the middle of the bag, and its lowest height."""
+        """Return the point (2,) of the body over the middle of the bag, and its lowest height.
+
+        That is its centre of gravity, to a millimetre, so that growing bodies share imprints.
+        """
         middle = (R_JA @ combined_cog(self.geometry.solids, trial.body))[:2]
-        return middle, self._lowest(trial.body, R_JA)
+        return np.round(middle, 3) + 0.0, self._lowest(trial.body, R_JA)
 
     def _lowest(self, names: Sequence[str], R_JA: np.ndarray) -> float:
         return min(float((self.geometry.solids[n].vertices @ R_JA[2]).min()) for n in names)
@@ -230,11 +234,12 @@ class Examiner:
     ) -> float:
         """Return what the body bears across, per force that the operation exerts across."""
         solids, jig = self.geometry.solids, self.setup.jig
+        p_G = (R_JA @ combined_cog(solids, trial.body))[:2] - self._place(trial, R_JA)[0]
         weight = GRAVITY * sum(solids[name].mass for name in trial.body)
         margins = []
         for piece in self.gravity.components(trial.moved):
             load = self._load(trial, piece, R_JA, approach)
-            bears = sideways_capacity(imprint, jig, weight, np.zeros(2), load)
+            bears = sideways_capacity(imprint, jig, weight, p_G, load)
             margins.append((bears / load.sideways, bears, load))
         margin, bears, load = min(margins, key=lambda entry: entry[0])
         figures |= {"bears_across_N": bears, "pushed_across_N": load.sideways}

@@ -127,13 +127,14 @@ def press(
         jig: Bag and beads.
         force: That ends the pressing [N].
     """
-    body = _together(parts)
+    body = _underside(parts, R_JA, jig.bag.cap_height)
     lowest = float((body.points @ R_JA[2]).min())
     bed, apex = _bed(jig), jig.bag.cap_height
     bed.inflate()
-    depth, borne, dt = 0.0, 0.0, STEP / SPEED
+    depth, borne = 0.0, 0.0
     while borne < force and depth < apex - jig.bag.floor:
-        depth += STEP
+        step = STEP if borne > force / 2 else 2 * STEP
+        depth, dt = depth + step, step / SPEED
         p_JA = np.array([*(-p_middle), apex - depth - lowest])
         pushed = bed.press((R_JA, p_JA), (np.zeros(3), np.array([0, 0, -SPEED])), body, dt)
         bed.settle(dt)
@@ -147,15 +148,15 @@ def _bed(jig: JigParameters) -> Bed:
     return Bed(replace(jig.bag, cell=CELL), jig.soil)
 
 
-def _together(parts: Iterable[SurfaceSamples]) -> SurfaceSamples:
+def _underside(parts: Iterable[SurfaceSamples], R_JA: np.ndarray, reach: float) -> SurfaceSamples:
+    """Return what of a body's surface looks down and can reach the bed."""
     listed = list(parts)
-    return SurfaceSamples(
-        "body",
-        np.concatenate([part.points for part in listed]),
-        np.concatenate([part.normals for part in listed]),
-        np.concatenate([part.areas for part in listed]),
-        listed[0].spacing,
-    )
+    points = np.concatenate([part.points for part in listed])
+    normals = np.concatenate([part.normals for part in listed])
+    height = points @ R_JA[2]
+    down = (normals @ R_JA[2] < 0.0) & (height <= height.min() + reach)
+    areas = np.concatenate([part.areas for part in listed])
+    return SurfaceSamples("body", points[down], normals[down], areas[down], SPACING)
 
 
 def _read(
@@ -163,7 +164,7 @@ def _read(
 ) -> Imprint:
     """Take over the bed's surface and the body's underside over it."""
     cap = Bed(bed.bag, bed.soil).heights
-    points = body.points[body.normals @ R_JA[2] < 0.0] @ R_JA.T + p_JA
+    points = body.points @ R_JA.T + p_JA
     at = np.rint((points[:, :2] - bed.axis[0]) / CELL).astype(int)
     inside = np.all((at >= 0) & (at < len(bed.axis)), axis=1)
     under = np.full(bed.heights.shape, np.inf)
