@@ -14,7 +14,7 @@ from planning.fixing.algorithm import FixingStep
 from planning.fixing.directions import opposite, unit_vector
 from planning.holding.footprint import posture
 
-INCOMING: Color = (0.93, 0.52, 0.13)
+MOVED: Color = (0.93, 0.52, 0.13)
 ARROW: Color = (0.80, 0.10, 0.12)
 BAG: Color = (0.16, 0.33, 0.30)
 BASE: Color = (0.42, 0.44, 0.47)
@@ -52,7 +52,7 @@ def step_arrangement(
     for name in moved:
         turned[name].apply_translation(start * leaving)
     shown = [Shown(bag_mesh(bag), BAG, frame=False), Shown(base_mesh(bag), BASE, frame=False)]
-    shown += _parts(product, turned, step.incoming)
+    shown += _parts(product, turned, moved)
     return [*shown, Shown(arrow([turned[n] for n in moved], -leaving), ARROW)]
 
 
@@ -111,13 +111,13 @@ def _box(meshes: Sequence[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _parts(
-    product: Product, turned: dict[str, trimesh.Trimesh], incoming: Sequence[str]
+    product: Product, turned: dict[str, trimesh.Trimesh], moved: Sequence[str]
 ) -> list[Shown]:
     """Return coloured parts; of a group the first is labelled, for all."""
     labels = _label_names(product, turned)
     place = list(product.parts).index
     return [
-        Shown(mesh, INCOMING if name in incoming else PARTS[place(name) % len(PARTS)], labels[name])
+        Shown(mesh, MOVED if name in moved else PARTS[place(name) % len(PARTS)], labels[name])
         for name, mesh in turned.items()
     ]
 

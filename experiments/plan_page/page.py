@@ -15,7 +15,8 @@ from experiments.plan_page.arrangement import exploded, step_arrangement
 from experiments.plan_page.heatmaps import contact_map, direction_maps
 from experiments.plan_page.scene import Shown, figure, picture
 from experiments.render import rendering_problem
-from planning.fixing.algorithm import READING, FixingStep
+from planning.fixing.algorithm import READING
+from planning.fixing.directions import opposite
 from planning.fixing.explain import blocker_text, step_text, stop_text
 from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import Candidate, Choice, Setup
@@ -98,7 +99,7 @@ def _steps(
         choice = choices[number] if number < len(choices) else None
         parts.append(f"<h3>{number + 1}. {escape(step.item)}</h3>")
         if pictured and number < MOST_STEPS_PICTURED:
-            parts.append(_picture(product, number, step, choice, setup))
+            parts.append(_picture(product, plan, number, choice, setup))
         parts.append(
             f"<p><b>Algorithm 1: {escape(step.posture)} / {escape(step.fixed_part)}.</b> "
             f"{escape(step_text(step).strip())}</p>"
@@ -110,13 +111,15 @@ def _steps(
 
 
 def _picture(
-    product: Product, number: int, step: FixingStep, choice: Choice | None, setup: Setup
+    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: Setup
 ) -> str:
+    step = plan.steps[number]
     figured = choice.candidates[choice.paper].figures if choice else {}
     depth = figured.get("depth_m", USUAL_DEPTH)
     shown = step_arrangement(product, step, setup.jig.bag, depth)
-    caption = f"Step {number + 1}: {step.item} onto {' + '.join(step.target)}, {step.up} up"
-    return _figure(shown, caption)
+    sides = [step.item, " + ".join(plan.order[: number + 1])]
+    moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
+    return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
 
 
 def _exploded(product: Product, plan: FixingPlan) -> str:

@@ -97,7 +97,7 @@ class Examiner:
         width = self._grip(trial, R_JA, figures)
         diameter = self._footprint(trial, R_JA, figures)
         imprint = self._imprint(trial, R_JA, figures)
-        self._check_clear_of_bed(trial, R_JA, imprint, notes)
+        self._check_clear_of_bed(trial, R_JA, approach, imprint, notes)
         lean = self._lean(trial, R_JA, imprint, figures)
         margin = self._holding(trial, R_JA, approach, imprint, figures, notes)
         bag = self.setup.jig.bag
@@ -171,23 +171,35 @@ class Examiner:
         return imprint
 
     def _check_clear_of_bed(
-        self, trial: Trial, R_JA: np.ndarray, imprint: Imprint, notes: list[str]
+        self, trial: Trial, R_JA: np.ndarray, approach: str, imprint: Imprint, notes: list[str]
     ) -> None:
         """What is moved must end above the frozen bed; a loose bolt may stand proud of its seat."""
         middle, low = self._place(trial, R_JA)
+        proud: dict[str, float] = {}
         for name in trial.moved:
             if self._lowest((name,), R_JA) > low + self.setup.jig.bag.cap_height:
                 continue
             depth = depth_in_bed(imprint, self._sampled(name), R_JA, middle, low)
             if depth <= BED_GIVES:
                 continue
-            fastener = self.product.fasteners.get(name)
-            if fastener and fastener.into not in trial.body:
-                notes.append(
-                    f"{name} stands {1e3 * depth:.0f} mm proud: the frozen bed is below it"
-                )
-            else:
+            if approach != "above" or depth > self._engagement(trial, name):
                 raise Rejected(f"{name} would end {1e3 * depth:.0f} mm inside the frozen bed")
+            proud[name] = depth
+        if proud:
+            most = 1e3 * max(proud.values())
+            notes.append(
+                f"put in loose, {_listed(list(proud))} may stand up to {most:.1f} mm proud of the "
+                "seat: the frozen bed is below"
+            )
+
+    def _engagement(self, trial: Trial, name: str) -> float:
+        """Return how far a bolt that is only put in may stand out and still be in its hole [m]."""
+        fastener = self.product.fasteners.get(name)
+        if fastener is None or fastener.into in trial.body or fastener.clamps not in trial.body:
+            return 0.0
+        axis = unit_vector(trial.up)
+        bolt, held = (self.geometry.solids[n].vertices @ axis for n in (name, fastener.clamps))
+        return float(min(bolt.max(), held.max()) - max(bolt.min(), held.min()))
 
     def _place(self, trial: Trial, R_JA: np.ndarray) -> tuple[np.ndarray, float]:
         """Return the point (2,) of the body over the middle of the bag, and its lowest height.
