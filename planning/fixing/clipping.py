@@ -52,23 +52,34 @@ class Polygons:
 
     def areas(self) -> np.ndarray:
         """Return the areas, (n,) [m^2]."""
-        corners = self.closed()
-        return 0.5 * cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
+        return self._areas_and_perimeters()[0]
 
     def inradius_bounds(self) -> np.ndarray:
         """Return a lower bound on each polygon's inscribed radius, area over perimeter [m]."""
-        corners = self.closed()
-        edges = np.roll(corners, -1, axis=1) - corners
-        perimeter = np.linalg.norm(edges, axis=2).sum(axis=1)
-        return np.divide(self.areas(), perimeter, out=0.0 * perimeter, where=perimeter > 0.0)
+        areas, perimeters = self._areas_and_perimeters()
+        return np.divide(areas, perimeters, out=0.0 * areas, where=perimeters > 0.0)
 
-    def centre(self, index: int) -> np.ndarray:
-        """Return a point (2,) inside one polygon: the mean of its corners."""
-        return self.corners[index, : self.count[index]].mean(axis=0)
+    def _areas_and_perimeters(self) -> tuple[np.ndarray, np.ndarray]:
+        x, y = np.moveaxis(self.closed(), 2, 0)
+        # From the first corner, to lose no digits far from the origin.
+        x, y = x - x[:, :1], y - y[:, :1]
+        x_next, y_next = (np.concatenate([c[:, 1:], c[:, :1]], axis=1) for c in (x, y))
+        areas = 0.5 * np.einsum("ij->i", x * y_next - x_next * y)
+        return areas, np.einsum("ij->i", np.hypot(x_next - x, y_next - y))
 
-    def chosen(self, which: np.ndarray) -> Polygons:
+    def centres(self) -> np.ndarray:
+        """Return a point (n, 2) inside each polygon that has an area: the mean of its corners."""
+        valid = np.arange(self.corners.shape[1]) < self.count[:, None]
+        total = np.einsum("ijk,ij->ik", self.corners, valid.astype(float))
+        return total / np.maximum(self.count, 1)[:, None]
+
+    def chosen(self, which: np.ndarray | slice) -> Polygons:
         """Return the polygons at the given indices or mask."""
         return Polygons(self.corners[which], self.count[which])
+
+    def filled(self) -> Polygons:
+        """Return those that have an area."""
+        return self.chosen((self.count >= 3) & (self.areas() > 0.0))
 
     def outlines(self) -> list[np.ndarray]:
         """Return each polygon without its padding."""
