@@ -1,8 +1,8 @@
 """Which parts block which others along one axis, with the margin of each decision.
 
 Three rounds, each for what the one before left open. Bounding boxes: parts that pass each other.
-Widest faces, for all pairs of parts at once: two large faces in each other's way settle most blocked
-pairs. All faces, a pair of parts at a time: only regions made of slivers need their union.
+Widest faces, for all pairs of parts at once: two large faces in each other's way settle most
+blocked pairs. All faces that can hit each other: only regions made of slivers need their union.
 
 A decision flips at some critical tolerance, below which the pair is blocked and above which it is
 free. It is not looked for where it does not matter: a pair blocked at 1.4 times the tolerance, or

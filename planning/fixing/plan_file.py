@@ -14,6 +14,7 @@ import numpy as np
 from cell.errors import CellError
 from planning.fixing.algorithm import READING, FixingStep, Stop
 from planning.fixing.directions import DIRECTIONS
+from planning.fixing.evidence import evidence_from_dict, evidence_to_dict
 from planning.fixing.interference import Blocker
 from planning.fixing.planner import FixingPlan
 
@@ -33,6 +34,7 @@ def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
         "stopped": _stop_to_dict(plan.stop) if plan.stop else None,
         "blockers": [_blocker_to_dict(blocker) for blocker in plan.blockers],
         "seconds": plan.seconds,
+        "evidence": evidence_to_dict(plan.evidence) if plan.evidence else None,
     }
 
 
@@ -49,6 +51,7 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
         steps=tuple(_step_from_dict(step) for step in data["steps"]),
         stop=_stop_from_dict(data["stopped"]) if data["stopped"] else None,
         seconds=data["seconds"],
+        evidence=evidence_from_dict(data["evidence"]) if data["evidence"] else None,
     )
 
 

@@ -5,19 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from cell.errors import CellError, UnknownName
 from cell.product import Product
 from planning.fixing.algorithm import FixingStep, Geometry, Stop, configure_fixing
-from planning.fixing.checks import without_overlaps
-from planning.fixing.contact import contact_matrix
+from planning.fixing.cache import cached_matrices
 from planning.fixing.directions import DIRECTIONS
-from planning.fixing.interference import FIT_TOLERANCE, Blocker, interference
+from planning.fixing.evidence import Evidence, evidence_of
+from planning.fixing.interference import Blocker
+from planning.fixing.matrices import matrices_of
 from planning.fixing.order import check_order, default_order
 from planning.fixing.reachability import reachable_matrices
-from planning.fixing.solids import solids_of
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,6 +36,7 @@ class FixingPlan:
         steps: One per item that comes in, up to where Algorithm 1 stopped.
         stop: Why it stopped, or None if the order is feasible.
         seconds: Time that planning took [s].
+        evidence: What the matrices rest on: tolerance, threads, margins, remarks on the input.
     """
 
     product: str
@@ -47,6 +49,7 @@ class FixingPlan:
     steps: tuple[FixingStep, ...]
     stop: Stop | None
     seconds: float
+    evidence: Evidence | None = None
 
     @property
     def feasible(self) -> bool:
@@ -55,14 +58,20 @@ class FixingPlan:
 
 
 def plan(
-    product: Product, order: tuple[str, ...] | None = None, *, tolerance: float = FIT_TOLERANCE
+    product: Product,
+    order: tuple[str, ...] | None = None,
+    *,
+    tolerance: float | None = None,
+    cache: Path | None = None,
 ) -> FixingPlan:
     """Decide what is fixed on the jig, and how, in each step of an assembly.
 
     Args:
         product: Parts in assembled poses.
         order: Items in the order of assembly; None for the product's default.
-        tolerance: Interference that does not block a motion [m].
+        tolerance: Gap that still touches, and overlap that does not block a motion [m]; None for
+            the product's own, or one derived from its sizes and clearances.
+        cache: Folder in which matrices are kept by content; None to compute them anew.
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
@@ -73,10 +82,12 @@ def plan(
     started = time.perf_counter()
     order = default_order(product) if order is None else order
     _check(product, order)
-    solids = without_overlaps(product, solids_of(product))
-    contact = contact_matrix(list(solids.values()), product.contact_tolerance)
-    leaving = interference(list(solids.values()), tolerance)
-    steps, stop = configure_fixing(product, order, Geometry(solids, contact, leaving))
+    if cache is None:
+        matrices = matrices_of(product, tolerance)
+    else:
+        matrices = cached_matrices(product, tolerance, cache)
+    contact, leaving = matrices.contact, matrices.leaving
+    steps, stop = configure_fixing(product, order, Geometry(matrices.solids, contact, leaving))
     return FixingPlan(
         product=product.name,
         order=order,
@@ -88,6 +99,7 @@ def plan(
         steps=steps,
         stop=stop,
         seconds=time.perf_counter() - started,
+        evidence=evidence_of(product, matrices, steps, stop),
     )
 
 

@@ -1,0 +1,186 @@
+"""What the matrices rest on, for the reader of a plan: tolerance, threads, margins, remarks.
+
+A decision is fragile if another tolerance, nearer than ``FRAGILE`` of it (0.02 mm of the usual
+0.05), would turn it over. The plan hangs on it if A(P_t, P_i) of some step would then differ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from typing import Any
+
+import numpy as np
+
+from cell.product import Product
+from planning.fixing.algorithm import FixingStep, Stop
+from planning.fixing.blocking import FRAGILE
+from planning.fixing.directions import opposite
+from planning.fixing.matrices import Matrices
+from planning.fixing.reachability import reachable_directions
+from planning.fixing.threads import Thread
+
+Places = Sequence[tuple[list[int], list[int]]]
+"""Matrix indices of target and incoming parts, for each step."""
+
+ALMOST = 1.0 - 1e-9  # A margin is fragile when it is less than the largest that is looked for.
+
+
+@dataclass(frozen=True)
+class Fragile:
+    """A decision that a slightly different tolerance would turn over.
+
+    Attributes:
+        part: Name of the part that moves, or of one of two that touch.
+        other: Name of the part that stays, or of the other.
+        direction: "+x" ... "-z" of the motion; "contact" for an entry of C.
+        value: The entry as it is, 0 or 1.
+        margin: By how much the tolerance can change before it flips, at least [m].
+        decides: Whether A(P_t, P_i) of some step of the plan would change with it.
+    """
+
+    part: str
+    other: str
+    direction: str
+    value: int
+    margin: float
+    decides: bool
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What the matrices of a plan rest on.
+
+    Attributes:
+        tolerance: Gap that still touches, and overlap that does not block [m].
+        declared: Whether the product declares it, or it was derived.
+        threads: Screw threads recognised from the meshes.
+        fragile: Decisions with a small margin, those that the plan hangs on first.
+        remarks: What was assumed or repaired while the product was read.
+    """
+
+    tolerance: float
+    declared: bool
+    threads: tuple[Thread, ...]
+    fragile: tuple[Fragile, ...]
+    remarks: tuple[str, ...]
+
+
+def evidence_of(
+    product: Product, matrices: Matrices, steps: Sequence[FixingStep], stop: Stop | None
+) -> Evidence:
+    """Return what a plan's matrices rest on."""
+    names = list(matrices.solids)
+    added = [(step.target, step.incoming) for step in (*steps, *([stop] if stop else []))]
+    places = [([names.index(t) for t in ts], [names.index(i) for i in ins]) for ts, ins in added]
+    found = [*_fragile_contacts(matrices, places), *_fragile_motions(matrices, places)]
+    return Evidence(
+        matrices.tolerance,
+        product.contact_tolerance == matrices.tolerance,
+        matrices.threads,
+        tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
+        product.remarks,
+    )
+
+
+def _fragile_contacts(matrices: Matrices, places: Places) -> list[Fragile]:
+    names, limit = list(matrices.solids), ALMOST * FRAGILE * matrices.tolerance
+    found = []
+    for i, k in np.argwhere(np.triu(matrices.contact_margin < limit, 1)):
+        contact = matrices.contact.copy()
+        contact[i, k] = 1 - contact[i, k]
+        decides = _changes(matrices, places, contact, matrices.leaving.free)
+        value, margin = int(matrices.contact[i, k]), float(matrices.contact_margin[i, k])
+        found.append(Fragile(names[i], names[k], "contact", value, margin, decides))
+    return found
+
+
+def _fragile_motions(matrices: Matrices, places: Places) -> list[Fragile]:
+    names, limit = list(matrices.solids), ALMOST * FRAGILE * matrices.tolerance
+    found = []
+    for j in ("+x", "+y", "+z"):
+        for i, k in np.argwhere(matrices.leaving.margin[j] < limit):
+            free = dict(matrices.leaving.free)
+            for d, row, column in ((j, i, k), (opposite(j), k, i)):
+                free[d] = free[d].copy()
+                free[d][row, column] = 1 - free[d][row, column]
+            decides = _changes(matrices, places, matrices.contact, free)
+            value = int(matrices.leaving.free[j][i, k])
+            margin = float(matrices.leaving.margin[j][i, k])
+            found.append(Fragile(names[i], names[k], j, value, margin, decides))
+    return found
+
+
+def _changes(
+    matrices: Matrices, places: Places, contact: np.ndarray, free: Mapping[str, np.ndarray]
+) -> bool:
+    """Say whether other matrices give another A(P_t, P_i) in some step."""
+    now = matrices.contact, matrices.leaving.free
+    return any(
+        reachable_directions(contact, free, *place) != reachable_directions(*now, *place)
+        for place in places
+    )
+
+
+def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
+    """Return the evidence as plain lists, numbers and strings; lengths in metres."""
+    data = asdict(evidence) | {"tolerance_m": evidence.tolerance}
+    del data["tolerance"]
+    for thread in data["threads"]:
+        for name in ("diameter", "height", "length"):
+            thread[f"{name}_m"] = thread.pop(name)
+        thread["middle_m"] = list(thread.pop("p_AoT"))
+        thread["axis"] = list(thread["axis"])
+    for decision in data["fragile"]:
+        decision["margin_m"] = decision.pop("margin")
+    return data | {key: list(data[key]) for key in ("threads", "fragile", "remarks")}
+
+
+def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
+    """Return the evidence that ``evidence_to_dict`` described."""
+    return Evidence(
+        data["tolerance_m"],
+        data["declared"],
+        tuple(_thread_from_dict(thread) for thread in data["threads"]),
+        tuple(_fragile_from_dict(decision) for decision in data["fragile"]),
+        tuple(data["remarks"]),
+    )
+
+
+def _thread_from_dict(data: Mapping[str, Any]) -> Thread:
+    lengths = {name: data[f"{name}_m"] for name in ("diameter", "height", "length")}
+    axis, middle = tuple(data["axis"]), tuple(data["middle_m"])
+    return Thread(data["bolt"], data["nut"], axis, middle, **lengths)
+
+
+def _fragile_from_dict(data: Mapping[str, Any]) -> Fragile:
+    fields = {name: data[name] for name in ("part", "other", "direction", "value", "decides")}
+    return Fragile(margin=data["margin_m"], **fields)
+
+
+def evidence_text(evidence: Evidence) -> str:
+    """Return the evidence in lines for a terminal."""
+    source = "declared by the product" if evidence.declared else "by default"
+    lines = [f"Tolerance {1e3 * evidence.tolerance:.3g} mm, {source}."]
+    lines += [f"Note: {remark}" for remark in evidence.remarks]
+    lines += [_thread_text(thread) for thread in evidence.threads]
+    lines += [_fragile_text(decision) for decision in evidence.fragile if decision.decides]
+    return "\n".join(lines)
+
+
+def _thread_text(thread: Thread) -> str:
+    x, y, z = (value + 0.0 for value in thread.axis)
+    return (
+        f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
+        f"{1e3 * thread.length:.3g} mm engaged, axis ({x:.3g}, {y:.3g}, {z:.3g})."
+    )
+
+
+def _fragile_text(decision: Fragile) -> str:
+    if decision.direction == "contact":
+        what = "touch" if decision.value else "do not touch"
+        claim = f"{decision.part} and {decision.other} {what}"
+    else:
+        what = "leaves" if decision.value else "does not leave"
+        claim = f"{decision.part} {what} {decision.other} along {decision.direction}"
+    return f"Warning: the plan hangs on {1e3 * decision.margin:.2g} mm of tolerance: {claim}."
