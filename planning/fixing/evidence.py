@@ -79,8 +79,18 @@ def evidence_of(
         product.contact_tolerance == matrices.tolerance,
         matrices.threads,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
-        product.remarks,
+        (*product.remarks, *_doubts(matrices)),
     )
+
+
+def _doubts(matrices: Matrices) -> list[str]:
+    """Return what a careful person would ask about."""
+    names = list(matrices.solids)
+    if len(names) == 1:
+        return [f"'{names[0]}' is the only part: there is nothing to assemble"]
+    touching = matrices.contact + matrices.contact.T
+    alone = [name for name, row in zip(names, touching, strict=True) if not row.any()]
+    return [f"{', '.join(alone)} touches no other part"] if alone else []
 
 
 def _fragile_contacts(matrices: Matrices, places: Places) -> list[Fragile]:
