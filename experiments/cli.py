@@ -84,6 +84,9 @@ class Plan:
     tolerance_mm: Annotated[float | None, arg(metavar="MM")] = None
     """Gap that still touches, overlap that does not block. Default: the product's, or derived."""
 
+    slanted: bool = False
+    """Also report ways out at an angle, from contact faces, and how far parts can move at all."""
+
     no_cache: bool = False
     """Compute the matrices anew, and do not keep them in the user's cache."""
 
@@ -116,6 +119,7 @@ class Plan:
             group=self.group,
             tolerance=None if self.tolerance_mm is None else 1e-3 * self.tolerance_mm,
             cache=None if self.no_cache else user_cache(),
+            slanted=self.slanted,
         )
 
 

@@ -41,7 +41,13 @@ def run_plan(
     described = load_product(
         product, options.units, densities=options.densities, group=options.group
     )
-    fixing = plan(described, order, tolerance=options.tolerance, cache=options.cache)
+    fixing = plan(
+        described,
+        order,
+        tolerance=options.tolerance,
+        cache=options.cache,
+        slanted=options.slanted,
+    )
     out.mkdir(parents=True, exist_ok=True)
     save_plan(fixing, out / "plan.json")
     _print(fixing, explain)

@@ -17,6 +17,7 @@ class PlanOptions:
         group: Whether identical parts form groups.
         tolerance: Gap that still touches, and overlap that does not block [m].
         cache: Folder in which matrices are kept by content.
+        slanted: Whether to look for ways out at an angle and for local freedom.
     """
 
     units: str | None = None
@@ -24,3 +25,4 @@ class PlanOptions:
     group: bool = False
     tolerance: float | None = None
     cache: Path | None = None
+    slanted: bool = False

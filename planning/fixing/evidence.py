@@ -6,7 +6,7 @@ A decision is fragile if another tolerance, nearer than ``FRAGILE`` of it (0.02 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from typing import Any
 
@@ -16,6 +16,7 @@ from cell.product import Product
 from planning.fixing.algorithm import FixingStep, Stop
 from planning.fixing.blocking import FRAGILE
 from planning.fixing.directions import opposite
+from planning.fixing.freedom import Freedom, freedoms
 from planning.fixing.matrices import Matrices
 from planning.fixing.reachability import reachable_directions
 from planning.fixing.threads import Thread
@@ -48,6 +49,19 @@ class Fragile:
 
 
 @dataclass(frozen=True)
+class Motion:
+    """How the parts of an item can move in the step in which it is added.
+
+    Attributes:
+        item: Of the order.
+        freedom: Direction, travel, and what they hit.
+    """
+
+    item: str
+    freedom: Freedom
+
+
+@dataclass(frozen=True)
 class Evidence:
     """What the matrices of a plan rest on.
 
@@ -57,6 +71,7 @@ class Evidence:
         threads: Screw threads recognised from the meshes.
         fragile: Decisions with a small margin, those that the plan hangs on first.
         remarks: What was assumed or repaired while the product was read.
+        motions: Local freedom and slanted ways out, where they were asked for.
     """
 
     tolerance: float
@@ -64,15 +79,25 @@ class Evidence:
     threads: tuple[Thread, ...]
     fragile: tuple[Fragile, ...]
     remarks: tuple[str, ...]
+    motions: tuple[Motion, ...] = ()
 
 
 def evidence_of(
-    product: Product, matrices: Matrices, steps: Sequence[FixingStep], stop: Stop | None
+    product: Product, matrices: Matrices, steps: Sequence[FixingStep | Stop], *, slanted: bool
 ) -> Evidence:
-    """Return what a plan's matrices rest on."""
+    """Return what a plan's matrices rest on.
+
+    Args:
+        product: What is planned.
+        matrices: Its matrices.
+        steps: The plan's steps, the one at which it stopped among them.
+        slanted: Whether to look for local freedom and slanted ways out as well.
+    """
     names = list(matrices.solids)
-    added = [(step.target, step.incoming) for step in (*steps, *([stop] if stop else []))]
-    places = [([names.index(t) for t in ts], [names.index(i) for i in ins]) for ts, ins in added]
+    places = [
+        ([names.index(part) for part in step.target], [names.index(part) for part in step.incoming])
+        for step in steps
+    ]
     found = [*_fragile_contacts(matrices, places), *_fragile_motions(matrices, places)]
     return Evidence(
         matrices.tolerance,
@@ -80,7 +105,19 @@ def evidence_of(
         matrices.threads,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
         (*product.remarks, *_doubts(matrices)),
+        tuple(_motions(matrices, steps)) if slanted else (),
     )
+
+
+def _motions(matrices: Matrices, steps: Sequence[FixingStep | Stop]) -> Iterator[Motion]:
+    solids = dict(matrices.solids)
+    for thread in matrices.threads:
+        solids[thread.nut] = solids[thread.nut].without(matrices.solids[thread.bolt])
+    for step in steps:
+        incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
+        axes = [thread.axis for thread in matrices.threads if thread.bolt in step.incoming]
+        for freedom in freedoms(incoming, target, matrices.tolerance, axes):
+            yield Motion(step.item, freedom)
 
 
 def _doubts(matrices: Matrices) -> list[str]:
@@ -143,7 +180,18 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
         thread["axis"] = list(thread["axis"])
     for decision in data["fragile"]:
         decision["margin_m"] = decision.pop("margin")
+    data["motions"] = [_motion_to_dict(motion) for motion in evidence.motions]
     return data | {key: list(data[key]) for key in ("threads", "fragile", "remarks")}
+
+
+def _motion_to_dict(motion: Motion) -> dict[str, Any]:
+    freedom = motion.freedom
+    return {
+        "item": motion.item,
+        "direction": list(freedom.direction),
+        "travel_m": None if freedom.leaves else freedom.travel,
+        "hits": freedom.hits,
+    }
 
 
 def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
@@ -154,7 +202,14 @@ def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
         tuple(_thread_from_dict(thread) for thread in data["threads"]),
         tuple(_fragile_from_dict(decision) for decision in data["fragile"]),
         tuple(data["remarks"]),
+        tuple(_motion_from_dict(motion) for motion in data["motions"]),
     )
+
+
+def _motion_from_dict(data: Mapping[str, Any]) -> Motion:
+    x, y, z = data["direction"]
+    travel = float("inf") if data["travel_m"] is None else data["travel_m"]
+    return Motion(data["item"], Freedom((x, y, z), travel, data["hits"]))
 
 
 def _thread_from_dict(data: Mapping[str, Any]) -> Thread:
@@ -175,14 +230,26 @@ def evidence_text(evidence: Evidence) -> str:
     lines += [f"Note: {remark}" for remark in evidence.remarks]
     lines += [_thread_text(thread) for thread in evidence.threads]
     lines += [_fragile_text(decision) for decision in evidence.fragile if decision.decides]
+    lines += [_motion_text(motion) for motion in evidence.motions]
     return "\n".join(lines)
 
 
+def _vector_text(vector: Sequence[float]) -> str:
+    x, y, z = (round(value, 6) + 0.0 for value in vector)  # Adding zero turns -0 into 0.
+    return f"({x:.3g}, {y:.3g}, {z:.3g})"
+
+
+def _motion_text(motion: Motion) -> str:
+    along = f"{motion.item} along {_vector_text(motion.freedom.direction)}"
+    if motion.freedom.leaves:
+        return f"Free: {along} to infinity."
+    return f"Local: {along} by {1e3 * motion.freedom.travel:.3g} mm, then {motion.freedom.hits}."
+
+
 def _thread_text(thread: Thread) -> str:
-    x, y, z = (value + 0.0 for value in thread.axis)
     return (
         f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
-        f"{1e3 * thread.length:.3g} mm engaged, axis ({x:.3g}, {y:.3g}, {z:.3g})."
+        f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
     )
 
 

@@ -73,6 +73,24 @@ def paired(down: Faces, up: Faces, d: np.ndarray, u: np.ndarray) -> FacePairs:
     return FacePairs(down, up, d, u, low, high)
 
 
+def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
+    """Return all pairs of faces, one of each, whose bounding rectangles overlap."""
+    if not len(a.low) or not len(b.low):
+        nothing = np.zeros(0, int)
+        return paired(a, b, nothing, nothing)
+    near = []
+    for own, other in ((a, b), (b, a)):
+        low, high = other.lower[:2], other.upper[:2]
+        meets = (own.low[:, :2] < high) & (own.high[:, :2] > low)
+        near.append(np.flatnonzero(meets[:, 0] & meets[:, 1]))
+    d, u = near
+    if not len(d) or not len(u):
+        return paired(a, b, d[:0], u[:0])
+    boxes = a.low[d, :2], a.high[d, :2], b.low[u, :2], b.high[u, :2]
+    row, column = _all_pairs(*boxes) if len(d) * len(u) <= DENSE else _grid_pairs(*boxes)
+    return paired(a, b, d[row], u[column])
+
+
 def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     """Return the faces that can hit each other.
 

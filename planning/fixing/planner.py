@@ -63,6 +63,7 @@ def plan(
     *,
     tolerance: float | None = None,
     cache: Path | None = None,
+    slanted: bool = False,
 ) -> FixingPlan:
     """Decide what is fixed on the jig, and how, in each step of an assembly.
 
@@ -72,6 +73,8 @@ def plan(
         tolerance: Gap that still touches, and overlap that does not block a motion [m]; None for
             the product's own, or one derived from its sizes and clearances.
         cache: Folder in which matrices are kept by content; None to compute them anew.
+        slanted: Whether to look, in each step, for ways out at an angle and for local freedom; they
+            are reported, the steps follow from the six directions alone.
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
@@ -88,6 +91,7 @@ def plan(
         matrices = cached_matrices(product, tolerance, cache)
     contact, leaving = matrices.contact, matrices.leaving
     steps, stop = configure_fixing(product, order, Geometry(matrices.solids, contact, leaving))
+    stages = (*steps, *([stop] if stop else []))
     return FixingPlan(
         product=product.name,
         order=order,
@@ -99,7 +103,7 @@ def plan(
         steps=steps,
         stop=stop,
         seconds=time.perf_counter() - started,
-        evidence=evidence_of(product, matrices, steps, stop),
+        evidence=evidence_of(product, matrices, stages, slanted=slanted),
     )
 
 
