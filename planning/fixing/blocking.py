@@ -158,10 +158,9 @@ def _seen_hits(
     seeds: dict[tuple[int, int], np.ndarray] = {}
     first = {parts: pairs.chosen(slice(FIRST)) for parts, pairs in group.items()}
     for parts, regions in _clipped(first, tolerance).items():
-        widths = regions.inradius_bounds()
-        widest = np.argsort(-widths)[:SEEDS]
-        centres = regions.chosen(widest[widths[widest] > 0.0]).centres()
-        if len(centres) and widths[widest[0]] >= tolerance:
+        widest = np.argsort(-regions.widths)[:SEEDS]
+        centres = regions.polygons.chosen(widest[regions.widths[widest] > 0.0]).centres()
+        if len(centres) and regions.widths[widest[0]] >= tolerance:
             hits[parts] = centres[0]
         else:
             seeds[parts] = centres
@@ -172,23 +171,37 @@ def _seen_hits(
             if parts not in hits and number < len(centres)
         }
         for parts, regions in _clipped(around, tolerance).items():
-            point = _wide_point([regions.filled()], tolerance)
+            point = _wide_point([regions], tolerance)
             if point is not None:
                 hits[parts] = point
     return hits
 
 
+@dataclass(frozen=True, eq=False)
+class _Regions:
+    """Blocked regions of one pair of parts with their areas, and bounds on their inradii [m]."""
+
+    polygons: Polygons
+    areas: np.ndarray
+    widths: np.ndarray
+
+
 def _clipped(
     group: Mapping[tuple[int, int], FacePairs], tolerance: float
-) -> dict[tuple[int, int], Polygons]:
-    """Return the blocked regions of several pairs of parts, clipped at once."""
+) -> dict[tuple[int, int], _Regions]:
+    """Return the blocked regions of several pairs of parts, clipped and measured at once."""
     if not group:
         return {}
-    regions = blocked_regions(list(group.values()), tolerance)
+    polygons = blocked_regions(list(group.values()), tolerance)
+    areas, perimeters = polygons.areas_and_perimeters()
+    widths = np.divide(areas, perimeters, out=np.zeros_like(areas), where=perimeters > 0.0)
     ends = np.cumsum([len(pairs) for pairs in group.values()])
     return {
-        parts: regions.chosen(slice(end - len(pairs), end))
-        for (parts, pairs), end in zip(group.items(), ends, strict=True)
+        parts: _Regions(polygons.chosen(own), areas[own], widths[own])
+        for parts, own in (
+            (parts, slice(end - len(pairs), end))
+            for (parts, pairs), end in zip(group.items(), ends, strict=True)
+        )
     }
 
 
@@ -227,20 +240,21 @@ def _probed(down: Faces, up: Faces, tolerance: float) -> np.ndarray | None:
 
 def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
     """Return a point (2,) of the plane over which the faces block, if there is one."""
-    slivers = [Polygons(np.zeros((0, 3, 2)), np.zeros(0, int))]
+    slivers: list[_Regions] = []
     for start in range(0, len(pairs), BATCH):
         batch = pairs.chosen(slice(start, start + BATCH))
-        regions = blocked_regions([batch], tolerance).filled()
-        widths = regions.inradius_bounds()
-        if len(widths) and widths.max() >= tolerance:
-            return regions.centres()[int(widths.argmax())]
+        regions = _clipped({(0, 1): batch}, tolerance)[0, 1]
+        widest = int(regions.widths.argmax())
+        if regions.widths[widest] >= tolerance:
+            return regions.polygons.chosen(slice(widest, widest + 1)).centres()[0]
         slivers.append(regions)
     return _wide_point(slivers, tolerance)
 
 
-def _wide_point(slivers: Sequence[Polygons], tolerance: float) -> np.ndarray | None:
+def _wide_point(slivers: Sequence[_Regions], tolerance: float) -> np.ndarray | None:
     """Return a point (2,) of the slivers' union that is wide enough around it, if there is one."""
-    if sum(float(regions.areas().sum()) for regions in slivers) < np.pi * tolerance**2:
+    if sum(float(regions.areas.sum()) for regions in slivers) < np.pi * tolerance**2:
         return None
-    outlines = [outline for regions in slivers for outline in regions.outlines()]
+    filled = [regions.polygons.chosen(regions.areas > 0.0) for regions in slivers]
+    outlines = [outline for polygons in filled for outline in polygons.outlines()]
     return point_in_wide_union(outlines, tolerance)

@@ -50,20 +50,18 @@ class Polygons:
         valid = np.arange(self.corners.shape[1]) < self.count[:, None]
         return np.where(valid[:, :, None], self.corners, self.corners[:, :1])
 
-    def areas(self) -> np.ndarray:
-        """Return the areas, (n,) [m^2]."""
-        return self._areas_and_perimeters()[0]
-
     def inradius_bounds(self) -> np.ndarray:
         """Return a lower bound on each polygon's inscribed radius, area over perimeter [m]."""
-        areas, perimeters = self._areas_and_perimeters()
-        return np.divide(areas, perimeters, out=0.0 * areas, where=perimeters > 0.0)
+        areas, perimeters = self.areas_and_perimeters()
+        return np.divide(areas, perimeters, out=np.zeros_like(areas), where=perimeters > 0.0)
 
-    def _areas_and_perimeters(self) -> tuple[np.ndarray, np.ndarray]:
-        x, y = np.moveaxis(self.closed(), 2, 0)
+    def areas_and_perimeters(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return both for each polygon, (n,) [m^2] and (n,) [m]."""
+        corners = self.closed()
         # From the first corner, to lose no digits far from the origin.
-        x, y = x - x[:, :1], y - y[:, :1]
-        x_next, y_next = (np.concatenate([c[:, 1:], c[:, :1]], axis=1) for c in (x, y))
+        x, y = corners[..., 0] - corners[:, :1, 0], corners[..., 1] - corners[:, :1, 1]
+        following = np.r_[1 : x.shape[1], 0]
+        x_next, y_next = x[:, following], y[:, following]
         areas = 0.5 * np.einsum("ij->i", x * y_next - x_next * y)
         return areas, np.einsum("ij->i", np.hypot(x_next - x, y_next - y))
 
@@ -76,10 +74,6 @@ class Polygons:
     def chosen(self, which: np.ndarray | slice) -> Polygons:
         """Return the polygons at the given indices or mask."""
         return Polygons(self.corners[which], self.count[which])
-
-    def filled(self) -> Polygons:
-        """Return those that have an area."""
-        return self.chosen((self.count >= 3) & (self.areas() > 0.0))
 
     def outlines(self) -> list[np.ndarray]:
         """Return each polygon without its padding."""

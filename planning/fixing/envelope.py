@@ -54,10 +54,10 @@ class Faces:
         u, v = point
         near = (self.low[:, 0] <= u) & (self.high[:, 0] >= u)
         near = np.flatnonzero(near & (self.low[:, 1] <= v) & (self.high[:, 1] >= v))
-        corners = self.corners[near]
-        edges = np.roll(corners, -1, axis=1) - corners
-        inside = np.all(cross(edges, point - corners) >= 0.0, axis=1)
-        return self.planes[near][inside] @ np.append(point, 1.0)
+        x, y = self.corners[near, :, 0] - u, self.corners[near, :, 1] - v
+        turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
+        inside = near[(turns[:, 0] >= 0.0) & (turns[:, 1] >= 0.0) & (turns[:, 2] >= 0.0)]
+        return self.planes[inside] @ np.array([u, v, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
