@@ -9,6 +9,8 @@ from __future__ import annotations
 
 import numpy as np
 import trimesh
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
 
 WELDS = (1e-9, 1e-8, 1e-7, 1e-6)  # [m] Tried in turn: rounding of double, of float32 in m, in mm.
 
@@ -24,7 +26,7 @@ def repaired(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, str]:
     for distance in WELDS:
         fixed = _cleaned(mesh, distance)
         if fixed.is_watertight and not fixed.is_winding_consistent:
-            trimesh.repair.fix_winding(fixed)
+            fixed = _wound(fixed)
         if _sound(fixed):
             return fixed, _remark(mesh, fixed, distance)
     return mesh, ""
@@ -46,6 +48,36 @@ def _cleaned(mesh: trimesh.Trimesh, distance: float) -> trimesh.Trimesh:
     fixed = trimesh.Trimesh(np.asarray(mesh.vertices)[first], faces, process=False)
     fixed.remove_unreferenced_vertices()
     return fixed
+
+
+def _wound(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return the surface with the faces of each body turned like the first of them."""
+    faces, pairs = np.array(mesh.faces), np.asarray(mesh.face_adjacency)
+    # Two faces agree if they run along their common edge in opposite senses.
+    agree = np.array(
+        [
+            _runs_along(faces[a], edge) != _runs_along(faces[b], edge)
+            for (a, b), edge in zip(pairs, mesh.face_adjacency_edges, strict=True)
+        ]
+    )
+    count = len(faces)
+    ends = (np.r_[pairs[:, 0], pairs[:, 1]], np.r_[pairs[:, 1], pairs[:, 0]])
+    weights = np.tile(np.where(agree, 1.0, 2.0), 2)
+    graph = csr_array((weights, ends), shape=(count, count))
+    turned, seen = np.zeros(count, bool), np.zeros(count, bool)
+    while not seen.all():
+        order, before = breadth_first_order(graph, int(seen.argmin()), directed=False)
+        seen[order] = True
+        for face in order[1:]:
+            turned[face] = turned[before[face]] != (graph[before[face], face] > 1.5)
+    faces[turned] = faces[turned][:, ::-1]
+    return trimesh.Trimesh(mesh.vertices, faces, process=False)
+
+
+def _runs_along(face: np.ndarray, edge: np.ndarray) -> bool:
+    """Say whether a face has its edge in the sense in which the edge is given."""
+    start = int(np.flatnonzero(face == edge[0])[0])
+    return bool(face[(start + 1) % 3] == edge[1])
 
 
 def _remark(mesh: trimesh.Trimesh, fixed: trimesh.Trimesh, distance: float) -> str:
