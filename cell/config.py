@@ -95,7 +95,7 @@ class DriverConfig:
         80.0, "rad/s", "Spindle while the bolt runs down: 760 rpm [A].", above=0.0
     )
     seat_speed: float = setting(
-        10.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0
+        7.0, "rad/s", "Spindle when the head is near its seat; faster overshoots [M].", above=0.0
     )
     push_force: float = setting(
         10.0, "N", "Thrust on the bit, 5 to 15 [A].", above=0.0, at_most=50.0

@@ -84,7 +84,7 @@ class Sensed:
         time: Time in the phase [s].
         step: Steps in the phase.
         wrench: By arm name: (6,) torque [N m] and force [N] that the surroundings exert on the
-            tool, in W, less the reading at the start of the phase.
+            tool, in W, less the reading at the latest taring.
         jaw_opening: Distance between the tip pads [m].
         jaw_rate: Its rate [m/s].
         bit_push: Axial force of the driver's bit holder [N].
@@ -137,6 +137,7 @@ class Phase:
         every_step: Event after every step: thread catch, for example.
         awake: Names of the parts that are awake during the phase.
         fine_log: Log every step.
+        tare: Whether the wrists read zero at the start; not in a phase that begins under load.
     """
 
     name: str
@@ -151,6 +152,7 @@ class Phase:
     every_step: Callable | None = None
     awake: frozenset[str] = frozenset()
     fine_log: bool = False
+    tare: bool = True
 
 
 @dataclass(frozen=True)

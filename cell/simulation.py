@@ -37,6 +37,7 @@ class Simulation:
         sensor: Where operations learn where parts are.
         log: What happened, every ``simulation.log_period``.
         stepping_cpu: CPU seconds spent stepping so far.
+        tare: By arm name, the wrist's reading (6,) [N m, N] that counts as zero.
     """
 
     def __init__(self, cell: Cell, seed: int = 0) -> None:
@@ -55,6 +56,7 @@ class Simulation:
         )
         self.log = Log()
         self.stepping_cpu = 0.0
+        self.tare = {name: np.zeros(6) for name in cell.wrists}
         self.steps = 0
         self._bed_pushes = False
         cell.reset(self.root)
@@ -135,7 +137,7 @@ class Simulation:
 
 
 class _PhaseRun:
-    """The moving state of one phase: step count, tare of the wrists, peaks."""
+    """The moving state of one phase: step count, peaks."""
 
     def __init__(self, simulation: Simulation, phase: Phase) -> None:
         self.simulation, self.phase = simulation, phase
@@ -145,7 +147,8 @@ class _PhaseRun:
         self.peak_force = {"left": 0.0, "right": 0.0}
         period = self.cell.config.simulation.log_period
         self.log_every = max(1, round(period / simulation.time_step))
-        self.tare = self._wrenches()
+        if phase.tare:
+            simulation.tare = self._wrenches()
         self.last: Sensed | None = None
         if phase.jaw is not None:
             self.cell.gripper.command(self.root, phase.jaw.opening, phase.jaw.force)
@@ -194,7 +197,7 @@ class _PhaseRun:
         """Read the sensors after a step, and log if it is time."""
         self.step += 1
         cell, context = self.cell, self.simulation.context
-        wrench = {name: now - self.tare[name] for name, now in self._wrenches().items()}
+        wrench = {name: now - self.simulation.tare[name] for name, now in self._wrenches().items()}
         for name, value in wrench.items():
             self.peak_force[name] = max(self.peak_force[name], float(np.linalg.norm(value[3:])))
         self.last = Sensed(

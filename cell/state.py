@@ -29,6 +29,7 @@ def save_state(simulation: Simulation) -> State:
         state[f"{name}/target"], state[f"{name}/effort"] = drive.values(root)
     for name, arm in cell.arms.items():
         state[f"{name}/torque_drive"] = np.array(arm.in_torque_drive())
+        state[f"{name}/tare"] = simulation.tare[name].copy()
     for part in cell.parts:
         state[f"asleep/{part.part.name}"] = np.array(part.asleep)
         state[f"pressing/{part.part.name}"] = np.array(part.body in cell.soft_jig.pressing)
@@ -85,6 +86,7 @@ def restore_state(simulation: Simulation, state: State) -> None:
         if state[f"asleep/{part.part.name}"]:
             part.sleep(root)
     for name, arm in cell.arms.items():
+        simulation.tare[name] = state[f"{name}/tare"]
         (arm.use_torque_drive if state[f"{name}/torque_drive"] else arm.use_position_drive)()
     for name, drive in _drives(simulation).items():
         target, effort = state[f"{name}/target"], state[f"{name}/effort"]

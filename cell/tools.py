@@ -15,7 +15,7 @@ from cell.arm import Drive
 # changes the force by 2.5 N [A].
 JAW_STIFFNESS = 2e4
 JAW_DAMPING = 200.0
-# Speed loop of the spindle: at the seating speed of 10 rad/s it stalls at 1 N m, so that the bolt
+# Speed loop of the spindle: at the seating speed of 7 rad/s it stalls at 0.7 N m, so that the bolt
 # still turns when the clutch trips at 0.5 N m and friction is fully mobilised [A].
 SPINDLE_GAIN = 0.1
 # Floating bit holder: lateral and axial springs [N/m], as compliant screwdriving heads have [A].

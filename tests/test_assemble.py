@@ -8,20 +8,26 @@ from typing import Any
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 from cell.config import CellConfig
 from cell.errors import BadOrder, CellError
 from cell.loading import load_product
 from cell.phase import Outcome, Phase, after
+from cell.product import Fit
 from cell.simulation import Simulation
 from cell.state import State, read_state, restore_state, save_state
 from experiments import run as run_module
+from experiments import shaft_insertion
 from experiments.assemble import run_assemble, run_job
 from experiments.job import Job
 from experiments.prepare import Disturbance, running_cell
 from experiments.run import Run, go_on
 from planning.fixing.planner import plan
+from planning.operations import insert_shaft
+from planning.operations.insert_shaft import goal_pose
 from planning.operations.sequence import Operation, operations, phases
+from planning.operations.station import Station
 
 PRODUCT = load_product("motor_unit")
 CONFIG = CellConfig()
@@ -204,11 +210,13 @@ def test_interrupted_run_continues_bit_identically(placed: Path) -> None:
     assert all(np.array_equal(one[name], two[name]) for name in one)
 
 
-@pytest.mark.slow
-def test_kinetic_energy_does_not_grow_at_rest(placed: Path) -> None:
-    """Every part awake, in the tray and on the jig, for 5 s after 0.5 s to come to rest."""
+def energies_at_rest(state: Path) -> list[float]:
+    """Return the parts' kinetic energy [J] every 0.5 s for 5 s, after 0.5 s to come to rest.
+
+    Every part is awake, in the tray and on the jig.
+    """
     simulation, _ = running_cell(PRODUCT, CONFIG, seed=0)
-    restore_state(simulation, read_state(placed / "state.npz"))
+    restore_state(simulation, read_state(state))
     parts = list(simulation.cell.parts)
     awake = frozenset(part.part.name for part in parts)
     simulation.run_phase(Phase("come to rest", after(0.5), 1.0, awake=awake))
@@ -216,15 +224,41 @@ def test_kinetic_energy_does_not_grow_at_rest(placed: Path) -> None:
     for _ in range(10):
         simulation.run_phase(Phase("rest", after(0.5), 1.0, awake=awake))
         energies.append(sum(part.kinetic_energy(simulation.context) for part in parts))
-    # A nanojoule is 0.1 mm/s of the motor: the creep of contact regularisation is far below.
+    return energies
+
+
+def assert_at_rest(energies: list[float]) -> None:
+    """A nanojoule is 0.1 mm/s of the motor: the creep of contact regularisation is far below."""
     assert max(energies) < 1e-9
     assert max(energies[5:]) <= max(energies[:5]) + 1e-10
 
 
 @pytest.mark.slow
-def test_whole_assembly_succeeds(tmp_path: Path) -> None:
+def test_kinetic_energy_does_not_grow_once_a_part_is_placed(placed: Path) -> None:
+    assert_at_rest(energies_at_rest(placed / "state.npz"))
+
+
+@pytest.mark.slow
+def test_whole_assembly_succeeds_and_rests(tmp_path: Path) -> None:
     assert run_assemble(**options(tmp_path)) == 0
     result = result_in(tmp_path)
     kinds = [step["operation"] for step in result["steps"]]
     assert kinds == ["pick_place", "insert_shaft", "place_bolts", "tighten_bolts"]
     assert not [check for step in result["steps"] for check in step["failed_checks"]]
+    assert_at_rest(energies_at_rest(tmp_path / "state.npz"))
+
+
+@pytest.mark.slow
+def test_search_finds_a_shaft_that_is_not_where_the_sensor_says(
+    placed: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """3 mm are beyond what the edge breaks catch (1 mm) and the soft hand yields (about 1 mm)."""
+
+    def misplaced(station: Station, fit: Fit) -> RigidTransform:
+        return RigidTransform([3e-3, 0.0, 0.0]) @ goal_pose(station, fit)
+
+    monkeypatch.setattr(insert_shaft, "goal_pose", misplaced)
+    arguments = ["--start", str(placed / "state.npz"), "--quiet", "--out", str(tmp_path)]
+    assert shaft_insertion.main(arguments) == 0
+    measured = result_in(tmp_path)["steps"][0]["measured"]
+    assert measured["searched"] == 1.0

@@ -9,8 +9,9 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cell.phase import Sensed
 from planning.operations.station import Station
-from planning.operations.tighten_bolts import star_order
+from planning.operations.tighten_bolts import CLUTCH_TIME, Clutch, star_order
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
@@ -44,3 +45,19 @@ def test_six_bolts_are_tightened_crosswise() -> None:
 def test_order_follows_the_bolts_as_they_are_listed() -> None:
     station, places = bolts_on_a_circle(6)
     assert star_order(station, list(reversed(places)))[0] == "bolt_5"
+
+
+def trip_time(torques: list[float], dt: float) -> float | None:
+    """Return when a clutch set to 0.5 N m trips, with one torque per step; None: never."""
+    clutch = Clutch(0.5)
+    for step, torque in enumerate(torques, start=1):
+        if clutch(cast(Sensed, SimpleNamespace(time=step * dt, spindle_torque=torque))):
+            return step * dt
+    return None
+
+
+@pytest.mark.parametrize("dt", [1e-3, 5e-4])
+def test_clutch_trips_on_torque_that_lasts_and_not_on_a_shock(dt: float) -> None:
+    shock, steps = 0.8, round(CLUTCH_TIME / dt)
+    assert trip_time([0.0, shock] * 20, dt) is None
+    assert trip_time([0.0, *[0.5] * (steps + 1)], dt) == pytest.approx(2 * dt + CLUTCH_TIME)

@@ -26,6 +26,8 @@ from cell.cad.shapes import (
     convex_revolve,
     cylinder,
     hexagon_prism,
+    joined,
+    open_band,
     revolved_surface,
     shank,
     to_trimesh,
@@ -58,7 +60,8 @@ PLATE_X, PLATE_Y_LOW, PLATE_Y_HIGH, PLATE_THICKNESS = 35.0, -33.0, 27.0, 5.0
 FOOT_THICKNESS, FOOT_BOTTOM = 5.0, -15.0
 FOOT_HOLE_RADIUS, FOOT_HOLE_X, FOOT_HOLE_Z = 2.25, 29.0, -10.0
 BOLT_HOLE_RADIUS = 1.7
-WASHER_RADIUS = 3.4  # [D] more than the head's 2.75; at 3.5 it would fill the bore's chamfer.
+BOLT_HOLE_EDGE = 0.2  # [A] broken by deburring; contact begins outside of it.
+WASHER_RADIUS = 3.4  # [D] of what carries the clamp; at 3.5 it would fill the bore's chamfer.
 ALUMINIUM = 2700.0  # kg/m3; the material is not in the files [A].
 
 # Bolts: six, every 60 degrees about the gearbox axis [M]; socket head cap screw.
@@ -66,6 +69,7 @@ BOLT_CIRCLE = 15.5
 BOLT_ANGLES_DEG = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)
 THREAD_RADIUS, BOLT_LENGTH, TIP_CHAMFER = 1.5, 10.0, 0.3
 HEAD_RADIUS, HEAD_HEIGHT = 2.75, 3.0
+BEARING_RADIUS = 2.5  # [R] ISO 4762: 2.53 or more; less what the corners of a hexagon need.
 SOCKET_FLATS, SOCKET_DEPTH = 2.5, 2.0  # [M] 1.3 to 2 mm deep; 2 gives the measured volume.
 THREAD_PITCH = 0.5
 STEEL = 7850.0  # kg/m3
@@ -76,6 +80,9 @@ BORE_FACETS = 64  # Sagitta 7 micrometres against 75 of clearance.
 
 # Contact [D]: softer metal lets a misplaced boss squeeze into the hole at tens of newtons.
 METAL_MODULUS = 1e10  # Pa
+# Metal comes off metal at no more than 1/d = 2 mm/s [A]: less than gravity adds in a step of 1 ms.
+# With the 10 s/m of softer things a part on its stiff seat is thrown back for ever [M].
+METAL_DISSIPATION = 500.0  # s/m
 FIT_FRICTION = 0.2  # [A] steel on aluminium, dry.
 NUT_FACTOR = 0.202  # [D] K of T = K d F for mu = 0.14 in thread and under the head.
 
@@ -85,23 +92,36 @@ ANODISED, BLACK_OXIDE, DARK = (0.62, 0.70, 0.80), (0.16, 0.16, 0.18), (0.28, 0.2
 
 # Contact meshes [M]: a step costs about 8 us for every contact polygon.
 BOSS_FACETS = 32  # Mean radius is kept; corners and flats differ by 14 um of 75 um clearance.
-WASHER_FACETS = 8
+WASHER_FACETS, HOLE_FACETS = 6, 8
 # The gearbox is felt twice: its face, compliant, by the plate; its side, rigid, by bed and jaws.
 # Under a bolt the face yields like the clamped aluminium, 3.5e8 N/m [D]: a modulus of 1e10 over
-# half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m.
+# half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m [D].
 SEAT_FACETS, SEAT_DEPTH, SEAT_GAP = 8, 1.5, 0.2
 HEAD_FACETS = 12  # A flat under each of the jaws, for grasps every 30 degrees.
+HEAD_STIFFNESS = 1e8  # N/m
 
 
 def lumped_head_friction() -> float:
     """Return the friction under the head that alone gives the nut factor K.
 
-    K d = P / (2 pi) + mu r_eff, with r_eff = 2/3 (ro^3 - ri^3) / (ro^2 - ri^2) of the annulus
-    between the bolt's hole and the rim of its head: the thread itself is simulated frictionless.
+    K d = P / (2 pi) + mu r_eff, with the r_eff of the annulus that the head bears on: the thread
+    itself is simulated frictionless.
     """
-    ro, ri = HEAD_RADIUS, BOLT_HOLE_RADIUS
-    r_eff = 2.0 / 3.0 * (ro**3 - ri**3) / (ro**2 - ri**2)
+    r_eff = friction_radius(BEARING_RADIUS, BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE, WASHER_FACETS)
     return (NUT_FACTOR * 2.0 * THREAD_RADIUS - THREAD_PITCH / (2.0 * np.pi)) / r_eff
+
+
+def friction_radius(outer: float, inner: float, facets: int) -> float:
+    """Return the mean distance from the axis over a ring of two polygons of given mean radii.
+
+    [D] Over a polygon with apothem a and half angle h of a facet the integral of r is
+    n a^3 / 3 (sec h tan h + arsinh tan h), and the area n a^2 tan h; 2/3 of the radius for many
+    facets.
+    """
+    half = np.pi / facets
+    apothem = vertex_radius(1.0, facets) * np.cos(half)
+    share = apothem / 3.0 * (1.0 / np.cos(half) + np.arcsinh(np.tan(half)) / np.tan(half))
+    return share * (outer**3 - inner**3) / (outer**2 - inner**2)
 
 
 def bolt_xy() -> list[tuple[float, float]]:
@@ -170,7 +190,7 @@ def motor_pieces() -> list[Piece]:
     Rear boss and terminals have none: they sink into the membrane, which the bed's own surface
     samples see, and nothing else ever reaches them.
     """
-    metal = Contact(FIT_FRICTION, METAL_MODULUS)
+    metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
     nose = convex_revolve(
         _mm([(BOSS_RADIUS, -1.0), (BOSS_RADIUS, BOSS_END - EDGE_BREAK)])
         + _mm([(BOSS_RADIUS - EDGE_BREAK, BOSS_END)]),
@@ -225,12 +245,25 @@ def plate_pieces() -> list[Piece]:
     """
     washer = Contact(lumped_head_friction())
     pieces = [Piece("bore", _bore_ring(), Contact(FIT_FRICTION))]
-    top, outer = PLATE_THICKNESS, WASHER_RADIUS
-    profile = [(BOLT_HOLE_RADIUS, 0.0), (outer, 0.0), (outer, top), (BOLT_HOLE_RADIUS, top)]
     for k, (x, y) in enumerate(bolt_xy()):
-        ring = revolved_surface(_mm(profile), WASHER_FACETS, center=(x * MM, y * MM))
-        pieces.append(Piece(f"washer_{k}", ring, washer))
+        pieces.append(Piece(f"washer_{k}", _washer((x * MM, y * MM)), washer))
     return pieces + _plate_boxes()
+
+
+def _washer(center: tuple[float, float]) -> trimesh.Trimesh:
+    """Return what is felt around a bolt's hole [m]: under the head, on the seat, and the wall.
+
+    The wall ends short of both faces: where they are pressed in by micrometres it would only cost.
+    Half a facet of phase keeps its corners inside the flats of the faces, whose edges would
+    otherwise cut into a leaning shank and lift it.
+    """
+    inner, top = BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE, PLATE_THICKNESS
+    head = [(BEARING_RADIUS, top), (inner, top)]
+    wall = [(BOLT_HOLE_RADIUS, top - BOLT_HOLE_EDGE), (BOLT_HOLE_RADIUS, BOLT_HOLE_EDGE)]
+    seat = [(inner, 0.0), (WASHER_RADIUS, 0.0)]
+    bands = [open_band(_mm(line), WASHER_FACETS, center) for line in (head, seat)]
+    bands.append(open_band(_mm(wall), HOLE_FACETS, center, phase=0.5))
+    return joined(bands)
 
 
 # Of the ring's section only the chamfers and the bore itself: the rest can touch nothing.
@@ -265,13 +298,17 @@ def _plate_boxes() -> list[Piece]:
 
 def bolt_pieces() -> list[Piece]:
     """Return the bolt's contact pieces."""
-    head = Contact(lumped_head_friction(), METAL_MODULUS)
+    # As a convex solid its pressure grows evenly from its underside to its middle.
+    bearing = np.pi * (BEARING_RADIUS**2 - (BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE) ** 2) * MM**2
+    modulus = HEAD_STIFFNESS * HEAD_HEIGHT / 2 * MM / bearing
+    head = Contact(lumped_head_friction(), modulus, dissipation=METAL_DISSIPATION)
+    thread = Contact(FIT_FRICTION, 1e9, dissipation=METAL_DISSIPATION)
     crown = _mm([(HEAD_RADIUS, 0.0), (HEAD_RADIUS, HEAD_HEIGHT)])
     body = _mm([(THREAD_RADIUS - TIP_CHAMFER, -BOLT_LENGTH)])
     body += _mm([(THREAD_RADIUS, -BOLT_LENGTH + TIP_CHAMFER), (THREAD_RADIUS, 0.0)])
     return [
         Piece("head", convex_revolve(crown, HEAD_FACETS, phase=0.5), head, convex=True),
-        Piece("shank", convex_revolve(body, 8), Contact(FIT_FRICTION, 1e9), convex=True),
+        Piece("shank", convex_revolve(body, 8), thread, convex=True),
     ]
 
 

@@ -90,6 +90,30 @@ def revolved_surface(
     return trimesh.Trimesh(np.concatenate(rings), _ring_faces(len(profile), facets), process=False)
 
 
+def open_band(
+    profile: Sequence[tuple[float, float]], facets: int, center: Point = (0, 0), phase: float = 0.0
+) -> trimesh.Trimesh:
+    """Return the open surface that a line from one (mean radius, z) to the next sweeps [m].
+
+    The arguments are those of `revolved_surface`; the surface faces right of the line.
+    """
+    band = revolved_surface(profile, facets, center, phase)
+    # The last edge of the closed profile leads back to its start.
+    felt = np.tile(np.repeat(np.arange(len(profile)) < len(profile) - 1, facets), 2)
+    band.update_faces(felt)
+    return band
+
+
+def joined(surfaces: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
+    """Return several surfaces as one, without merging corners."""
+    first = np.cumsum([0, *(len(surface.vertices) for surface in surfaces[:-1])])
+    return trimesh.Trimesh(
+        np.concatenate([surface.vertices for surface in surfaces]),
+        np.concatenate([s.faces + k for s, k in zip(surfaces, first, strict=True)]),
+        process=False,
+    )
+
+
 def _ring_faces(rings: int, facets: int) -> np.ndarray:
     """Return (2 * rings * facets, 3) indices that join each ring of vertices to the next."""
     ring, sector = np.meshgrid(np.arange(rings), np.arange(facets), indexing="ij")

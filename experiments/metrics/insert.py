@@ -11,7 +11,7 @@ from experiments.metrics.common import Measured, base_moved
 from experiments.record import Arrays, OperationRecord, logged_poses, rows_of
 from experiments.snapshot import Snapshot
 
-INSERTION_PHASES = ("insert", "search", "insert again")
+INSERTION_PHASES = ("insert", "search", "insert again", "press")
 
 
 def measure_insert(cell: Cell, record: OperationRecord, log: Arrays) -> Measured:

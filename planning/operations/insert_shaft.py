@@ -155,6 +155,7 @@ def _insert(
             guard=lambda sensed: holding(sensed) or too_much_force(sensed),
             awake=awake,
             fine_log=True,
+            tare=name == "insert",
         )
 
     def height(sensed: Sensed) -> np.ndarray:
@@ -176,6 +177,9 @@ def _insert(
         yield soft("search", config.search_force, search, found, length / config.search_speed)
         again = descent(X_WSeat, mouth - 1e-3, config, height)
         outcome = yield soft("insert again", config.force_limit, *again)
+    # Where the part has found its place: a spring that still pulls sideways would wedge it there.
+    X_WC = RigidTransform(X_WSeat.rotation(), (outcome.sensed.X_WF(jaw) @ X_JawC).translation())
+    yield soft("press", config.force_limit, *pressing(X_WC, height))
 
 
 def too_much_force(sensed: Sensed) -> str | None:
@@ -222,6 +226,14 @@ def descent(
         return stalled(sensed) and sensed.time >= times[-1] + STALL_TIME
 
     return target, until, float(times[-1]) + PATIENCE
+
+
+def pressing(
+    X_WC: RigidTransform, height: Callable[[Sensed], np.ndarray]
+) -> tuple[Target, Condition, float]:
+    """Return target, end condition and time-out of a push straight down from where the part is."""
+    below = raised(X_WC, -BEYOND)
+    return lambda t: below, Stalled(height), PATIENCE
 
 
 def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:

@@ -29,6 +29,7 @@ FEED_DEPTH = 0.008  # The feed can follow the bolt this far [m]: engaged length 
 FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
 FEED_LIMIT = 0.02  # [m/s] [A]
 STOP_TIME = 0.05  # Of the spindle [s] [A].
+CLUTCH_TIME = 0.002  # The clutch does not feel shorter shocks [s] [A].
 
 
 def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
@@ -74,6 +75,27 @@ class Feed:
         self.progress = float(np.clip(self.progress + rate * self.dt, 0.0, self.line.duration))
         q, v = self.line.at(self.progress)
         return q, v * rate
+
+
+@dataclass
+class Clutch:
+    """End condition: the spindle has kept up a torque; a shock does not trip it.
+
+    Attributes:
+        torque: To trip at [N m].
+    """
+
+    torque: float
+    _reached: float | None = None
+
+    def __call__(self, sensed: Sensed) -> bool:
+        """Return whether the clutch trips."""
+        if sensed.spindle_torque < self.torque:
+            self._reached = None
+        elif self._reached is None:
+            self._reached = sensed.time
+        # Times are multiples of the step, so half a microsecond only absorbs rounding.
+        return self._reached is not None and sensed.time >= self._reached + CLUTCH_TIME - 5e-7
 
 
 def tighten_bolt(station: Station, bolt: str) -> Iterator[Phase]:
@@ -129,7 +151,7 @@ def _drive(station: Station, bolt: str) -> Iterator[Phase]:
     )
     yield Phase(
         f"{bolt}: tighten",
-        lambda sensed: sensed.spindle_torque >= thread.fastener.torque,
+        Clutch(thread.fastener.torque),
         timeout=5.0,
         right=feed,
         spindle=driver.seat_speed,

@@ -1,0 +1,143 @@
+"""The assembly repeated with one seed after another: how often it succeeds, and how evenly.
+
+    python -m experiments.repeat --seeds 10 --workers 2 --out out/repeat
+
+Every run is that of `soft-jig assemble`, in a process and a folder of its own. Prints one row per
+seed and one per limit, and writes both as summary.json.
+"""
+
+from __future__ import annotations
+
+import json
+import multiprocessing
+import sys
+from collections.abc import Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
+
+from cell.errors import CellError
+from cell.loading import load_product
+from experiments.cli import Assemble, BadUsage
+from experiments.criteria import LIMITS, Limit
+from experiments.output import output_folder, write_json
+
+
+@dataclass(frozen=True)
+class Options:
+    """Options of `soft-jig assemble`, how often, and on how many cores."""
+
+    assemble: OmitArgPrefixes[Assemble] = field(default_factory=Assemble)
+
+    seeds: int = 10
+    """Number of runs; their seeds count up from --seed."""
+
+    workers: Annotated[int, arg(metavar="CORES")] = 1
+    """Runs at a time."""
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the script; return 0 if every run succeeded, 1 if one failed, 2 for bad input."""
+    try:
+        options = tyro.cli(
+            Options, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
+        )
+        return _repeat(options)
+    except CellError as error:
+        print(f"repeat: {error}", file=sys.stderr)
+        return 2
+
+
+def _repeat(options: Options) -> int:
+    for name in ("seeds", "workers"):
+        if getattr(options, name) < 1:
+            raise BadUsage(f"--{name} must be >= 1, not {getattr(options, name)}.")
+    # Bad input is found here, once, and not in every process.
+    options.assemble.common.load_config()
+    load_product(options.assemble.product)
+    console = Console(quiet=options.assemble.common.quiet, highlight=False)
+    with output_folder(options.assemble.common.out) as out:
+        spawn = multiprocessing.get_context("spawn")
+        with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
+            results = list(pool.map(_run, _jobs(options)))
+        ranges = {limit: _range(limit, results) for limit in LIMITS}
+        write_json(out / "summary.json", _summary(results, ranges))
+    console.print(_seed_table(results))
+    console.print(_range_table(ranges))
+    return 0 if all(result["verdict"] == "success" for result in results) else 1
+
+
+def _jobs(options: Options) -> Iterator[Assemble]:
+    job, common = options.assemble, options.assemble.common
+    for seed in range(common.seed, common.seed + options.seeds):
+        own = replace(common, seed=seed, out=common.out / str(seed), quiet=True)
+        yield replace(job, common=own)
+
+
+def _run(job: Assemble) -> dict[str, Any]:
+    """Run one assembly; return its ``result.json``."""
+    job.run()
+    return json.loads((job.common.out / "result.json").read_text(encoding="utf-8"))
+
+
+def _range(limit: Limit, results: Sequence[dict[str, Any]]) -> tuple[float, float] | None:
+    """Return the smallest and the largest value of a limited quantity over all runs and parts."""
+    values = [
+        value
+        for result in results
+        for step in result["steps"]
+        if step["operation"] == limit.kind
+        for name, value in step["measured"].items()
+        if name.rsplit("/", 1)[-1] == limit.quantity
+    ]
+    return (min(values), max(values)) if values else None
+
+
+def _failures(result: dict[str, Any]) -> list[str]:
+    """Return the phase that a run failed in, or the checks that it did not pass."""
+    if failure := result.get("failure"):
+        return [f"{failure['phase']}: {failure['evidence']}"]
+    return [check["quantity"] for step in result["steps"] for check in step["failed_checks"]]
+
+
+def _summary(
+    results: Sequence[dict[str, Any]], ranges: dict[Limit, tuple[float, float] | None]
+) -> dict[str, Any]:
+    return {
+        "runs": [
+            {
+                "seed": result["seed"],
+                "verdict": result["verdict"],
+                "real_time_factor": result.get("real_time_factor"),
+                "failures": _failures(result),
+            }
+            for result in results
+        ],
+        "ranges": {f"{limit.kind}/{limit.quantity}": found for limit, found in ranges.items()},
+    }
+
+
+def _seed_table(results: Sequence[dict[str, Any]]) -> Table:
+    table = Table("seed", "verdict", "simulated s / CPU s", "failure", title="Runs")
+    for result in results:
+        speed = result.get("real_time_factor")
+        shown = "-" if speed is None else f"{speed:.3f}"
+        table.add_row(str(result["seed"]), result["verdict"], shown, "; ".join(_failures(result)))
+    return table
+
+
+def _range_table(ranges: dict[Limit, tuple[float, float] | None]) -> Table:
+    table = Table("operation", "quantity", "smallest", "largest", "limit", title="Over all runs")
+    for limit, found in ranges.items():
+        low, high = ("-", "-") if found is None else (f"{value:.4g}" for value in found)
+        table.add_row(limit.kind, limit.quantity, low, high, f"{limit.limit:.4g}")
+    return table
+
+
+if __name__ == "__main__":
+    sys.exit(main())
