@@ -41,7 +41,8 @@ def load_step(file: Path) -> dict[str, trimesh.Trimesh]:
     scene = _scene(file)
     meshes: dict[str, trimesh.Trimesh] = {}
     for node in scene.graph.nodes_geometry:
-        X_AP, product = scene.graph[node]
+        X_AP, geometry = scene.graph[node]
+        product = str(geometry)
         shape = scene.geometry[product]
         if not isinstance(shape, trimesh.Trimesh):
             continue

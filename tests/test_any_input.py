@@ -20,7 +20,10 @@ from experiments.cli import main
 
 PLATE = box((40, 40, 10), (-20, -20, 0)) - rod(6, -1, 11, 32) - rod(6, -1, 11).translate([12, 0, 0])
 PIN = rod(6, 0, 20, 32)
-INSTANCES = [("base", "plate", (5.0, 0.0, 0.0)), ("NAUO2", "pin", (5.0, 0.0, 0.0))]
+INSTANCES: list[tuple[str, str, tuple[float, float, float]]] = [
+    ("base", "plate", (5.0, 0.0, 0.0)),
+    ("NAUO2", "pin", (5.0, 0.0, 0.0)),
+]
 INSTANCES += [("pin", "pin", (17.0, 0.0, 0.0))]
 
 
@@ -32,7 +35,7 @@ def own_cache(tmp_path_factory, monkeypatch):
 def step_file(folder: Path, unit: str = "mm") -> Path:
     scale = 1.0 if unit == "mm" else 1e-3
     shapes = {"plate": PLATE.scale([scale] * 3), "pin": PIN.scale([scale] * 3)}
-    places = [(n, s, tuple(scale * v for v in p)) for n, s, p in INSTANCES]
+    places = [(n, s, (scale * x, scale * y, scale * z)) for n, s, (x, y, z) in INSTANCES]
     file = folder / "asm.step"
     file.write_text(step_assembly(shapes, places, unit))
     return file

@@ -40,7 +40,7 @@ def test_plan_gets_its_options(calls: list[dict], tmp_path: Path) -> None:
     options = ["--order", "a,b", "--units", "in", "--explain", "--out", str(tmp_path)]
     options += ["--density", "7850", "--density", "a=1000", "--group", "--tolerance-mm", "0.02"]
     assert main(["plan", "folder", *options, "--no-cache"]) == 0
-    expected = PlanOptions("in", {"": 7850.0, "a": 1000.0}, True, pytest.approx(2e-5), None)
+    expected = PlanOptions("in", {"": 7850.0, "a": 1000.0}, True, 1e-3 * 0.02)
     assert calls == [dict(product="folder", order=("a", "b"), options=expected, explain=True)]
     assert (tmp_path / "plan.json").exists()
 

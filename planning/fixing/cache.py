@@ -54,8 +54,8 @@ def key_of(product: Product, solids: Mapping[str, Solid], tolerance: float | Non
     digest.update(json.dumps([tolerance, pairs]).encode())
     for name, solid in solids.items():
         digest.update(f"{name} {solid.vertices.shape} {solid.faces.shape}".encode())
-        digest.update(np.ascontiguousarray(solid.vertices, float))
-        digest.update(np.ascontiguousarray(solid.faces, np.int64))
+        digest.update(np.asarray(solid.vertices, float).tobytes())
+        digest.update(np.asarray(solid.faces, np.int64).tobytes())
     return digest.hexdigest()
 
 

@@ -171,7 +171,8 @@ def _changes(
 
 def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     """Return the evidence as plain lists, numbers and strings; lengths in metres."""
-    data = asdict(evidence) | {"tolerance_m": evidence.tolerance}
+    data: dict[str, Any] = asdict(evidence)
+    data["tolerance_m"] = data["tolerance"]
     del data["tolerance"]
     for thread in data["threads"]:
         for name in ("diameter", "height", "length"):
