@@ -11,8 +11,10 @@ from rich.console import Console
 from cell.config import CellConfig
 from cell.loading import load_product
 from experiments.output import write_arrays
+from experiments.plan_options import PlanOptions
 from experiments.plan_page.page import write_page
 from planning.fixing.directions import DIRECTIONS
+from planning.fixing.evidence import evidence_text
 from planning.fixing.explain import explanation, step_table, step_text, stop_text
 from planning.fixing.plan_file import save_plan
 from planning.fixing.planner import FixingPlan, plan
@@ -28,7 +30,7 @@ MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, als
 def run_plan(
     product: str,
     order: tuple[str, ...] | None,
-    units: str | None,
+    options: PlanOptions,
     explain: bool,
     out: Path,
     *,
@@ -40,7 +42,7 @@ def run_plan(
     Args:
         product: A name in ``models/products``, or what else ``load_product`` reads.
         order: Parts or groups in the order of assembly, or None for the product's default.
-        units: Length unit of meshes that state none.
+        options: How the product is read and planned.
         explain: Whether to print matrices, reasons, candidates and evidence as well.
         out: Folder for the files; made if missing.
         config: The cell that the general rule reckons with; None for the default.
@@ -52,8 +54,16 @@ def run_plan(
     Raises:
         CellError: The product or the order cannot be used; nothing is written.
     """
-    described = load_product(product, units=units)
-    fixing = plan(described, order)
+    described = load_product(
+        product, options.units, densities=options.densities, group=options.group
+    )
+    fixing = plan(
+        described,
+        order,
+        tolerance=options.tolerance,
+        cache=options.cache,
+        slanted=options.slanted,
+    )
     assert fixing.geometry is not None
     console = _console()
     _print_plan(console, fixing, explain)
@@ -96,6 +106,7 @@ def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
     lines = [explanation(fixing)] if explain else [step_text(step) for step in fixing.steps]
     lines += [stop_text(fixing.stop)] if fixing.stop else []
     lines += [advice_text(fixing.orders)] if fixing.orders else []
+    lines += [evidence_text(fixing.evidence)] if fixing.evidence else []
     _print_lines(console, lines)
 
 

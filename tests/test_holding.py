@@ -16,7 +16,6 @@ from cell.soft_jig import JigParameters
 from planning import plan
 from planning.fixing.algorithm import Geometry
 from planning.fixing.directions import DIRECTIONS, unit_vector
-from planning.fixing.planner import geometry_of
 from planning.holding.candidate import Candidate, Choice, Setup
 from planning.holding.capacity import Load, passive_pressure, sideways_capacity, turning_capacity
 from planning.holding.footprint import footprint, posture
@@ -27,6 +26,12 @@ from planning.holding.rule import general_rule
 
 JIG = JigParameters()
 SETUP = Setup.of(CellConfig.load())
+
+
+def geometry_of(product: Product) -> Geometry:
+    geometry = plan(product).geometry
+    assert geometry is not None
+    return geometry
 
 
 def choices(product: Product, order: tuple[str, ...] | None = None) -> tuple[Choice, ...]:

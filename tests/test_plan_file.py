@@ -19,6 +19,7 @@ from tiny_products import (
 import experiments.plan_command as plan_command
 from cell.errors import CellError
 from experiments.plan_command import run_plan
+from experiments.plan_options import PlanOptions
 from planning import FixingPlan, load_plan, plan, save_plan
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.explain import explanation, stop_text
@@ -91,8 +92,8 @@ def test_explanation_shows_every_matrix():
 
 def run(monkeypatch, capsys, product, folder: Path, **options) -> tuple[int, str, FixingPlan]:
     """Run the command on a product built in code."""
-    monkeypatch.setattr(plan_command, "load_product", lambda name, units: product)
-    arguments = {"order": None, "units": None, "explain": False} | options
+    monkeypatch.setattr(plan_command, "load_product", lambda *_, **__: product)
+    arguments = {"order": None, "options": PlanOptions(), "explain": False} | options
     code = run_plan("tiny", out=folder, **arguments)
     return code, capsys.readouterr().out, load_plan(folder / "plan.json")
 
@@ -127,12 +128,12 @@ def test_nothing_is_written_for_bad_input(monkeypatch, capsys, tmp_path):
 
 
 def test_command_plans_the_motor_unit(capsys, tmp_path):
-    assert run_plan("motor_unit", ("plate", "bolts", "motor"), None, False, tmp_path) == 0
+    assert run_plan("motor_unit", ("plate", "bolts", "motor"), PlanOptions(), False, tmp_path) == 0
     assert "-z / motor" in capsys.readouterr().out
 
 
 def test_command_names_the_nearest_order(capsys, tmp_path):
-    assert run_plan("motor_unit", ("motor", "bolts", "plate"), None, False, tmp_path) == 1
+    assert run_plan("motor_unit", ("motor", "bolts", "plate"), PlanOptions(), False, tmp_path) == 1
     text = capsys.readouterr().out
     assert "Infeasible: plate cannot be added to motor, bolt_1" in text
     assert "+z: plate hits bolt_1 at (" in text

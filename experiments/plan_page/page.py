@@ -17,6 +17,7 @@ from experiments.plan_page.scene import Shown, figure, picture
 from experiments.render import rendering_problem
 from planning.fixing.algorithm import READING
 from planning.fixing.directions import opposite
+from planning.fixing.evidence import evidence_text
 from planning.fixing.explain import blocker_text, step_text, stop_text
 from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import Candidate, Choice, Setup
@@ -55,6 +56,7 @@ def write_page(
         section("Steps", _steps(product, plan, choices, setup, pictured=problem is None)),
         section("Exploded view", "" if problem else _exploded(product, plan)),
         section("Matrices", _matrices(plan)),
+        section("What the matrices rest on", _evidence(plan)),
         section("What blocks what", _blockers(plan)),
     ]
     body = "\n".join(filter(None, sections))
@@ -179,6 +181,10 @@ def _matrices(plan: FixingPlan) -> str:
             ),
         ]
     )
+
+
+def _evidence(plan: FixingPlan) -> str:
+    return f"<pre>{escape(evidence_text(plan.evidence))}</pre>" if plan.evidence else ""
 
 
 def _blockers(plan: FixingPlan) -> str:

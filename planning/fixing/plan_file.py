@@ -14,6 +14,7 @@ import numpy as np
 from cell.errors import CellError
 from planning.fixing.algorithm import READING, FixingStep, Stop
 from planning.fixing.directions import DIRECTIONS
+from planning.fixing.evidence import evidence_from_dict, evidence_to_dict
 from planning.fixing.interference import Blocker
 from planning.fixing.planner import FixingPlan
 from planning.ordering.advice_file import advice_from_dict, advice_to_dict
@@ -35,6 +36,7 @@ def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
         "blockers": [_blocker_to_dict(blocker) for blocker in plan.blockers],
         "orders": advice_to_dict(plan.orders) if plan.orders else None,
         "seconds": plan.seconds,
+        "evidence": evidence_to_dict(plan.evidence) if plan.evidence else None,
     }
 
 
@@ -52,6 +54,7 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
         stop=_stop_from_dict(data["stopped"]) if data["stopped"] else None,
         seconds=data["seconds"],
         orders=advice_from_dict(data["orders"]) if data["orders"] else None,
+        evidence=evidence_from_dict(data["evidence"]) if data["evidence"] else None,
     )
 
 

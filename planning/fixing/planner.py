@@ -5,19 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
 from cell.errors import CellError, UnknownName
 from cell.product import Product
 from planning.fixing.algorithm import FixingStep, Geometry, Stop, configure_fixing
-from planning.fixing.checks import without_overlaps
-from planning.fixing.contact import contact_matrix
+from planning.fixing.cache import cached_matrices
 from planning.fixing.directions import DIRECTIONS
-from planning.fixing.interference import FIT_TOLERANCE, Blocker, interference
+from planning.fixing.evidence import Evidence, evidence_of
+from planning.fixing.interference import Blocker
+from planning.fixing.matrices import matrices_of
 from planning.fixing.order import check_order
 from planning.fixing.reachability import reachable_matrices
-from planning.fixing.solids import solids_of
 from planning.ordering.advice import OrderAdvice, advise, fallback_order
 
 
@@ -35,8 +36,9 @@ class FixingPlan:
         blockers: Evidence for every 0 of the M_j.
         steps: One per item that comes in, up to where Algorithm 1 stopped.
         stop: Why it stopped, or None if the order is feasible.
-        orders: The best orders there are; None where an order was asked for and is feasible.
         seconds: Time that planning took [s], without that for the orders.
+        evidence: What the matrices rest on: tolerance, threads, margins, remarks on the input.
+        orders: The best orders there are; None where an order was asked for and is feasible.
         geometry: What the decisions rest on; None for a plan that was read from a file.
     """
 
@@ -50,6 +52,7 @@ class FixingPlan:
     steps: tuple[FixingStep, ...]
     stop: Stop | None
     seconds: float
+    evidence: Evidence | None = None
     orders: OrderAdvice | None = None
     geometry: Geometry | None = None
 
@@ -60,7 +63,12 @@ class FixingPlan:
 
 
 def plan(
-    product: Product, order: tuple[str, ...] | None = None, *, tolerance: float = FIT_TOLERANCE
+    product: Product,
+    order: tuple[str, ...] | None = None,
+    *,
+    tolerance: float | None = None,
+    cache: Path | None = None,
+    slanted: bool = False,
 ) -> FixingPlan:
     """Decide what is fixed on the jig, and how, in each step of an assembly.
 
@@ -68,7 +76,11 @@ def plan(
         product: Parts in assembled poses.
         order: Items in the order of assembly; None for the product's default, or the best there is
             if it states none.
-        tolerance: Interference that does not block a motion [m].
+        tolerance: Gap that still touches, and overlap that does not block a motion [m]; None for
+            the product's own, or one derived from its sizes and clearances.
+        cache: Folder in which matrices are kept by content; None to compute them anew.
+        slanted: Whether to look, in each step, for ways out at an angle and for local freedom; they
+            are reported, the steps follow from the six directions alone.
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
@@ -78,13 +90,18 @@ def plan(
     """
     started = time.perf_counter()
     _check(product, order)
-    geometry = geometry_of(product, tolerance)
-    contact, leaving = geometry.contact, geometry.interference
+    if cache is None:
+        matrices = matrices_of(product, tolerance)
+    else:
+        matrices = cached_matrices(product, tolerance, cache)
+    contact, leaving = matrices.contact, matrices.leaving
+    geometry = Geometry(matrices.solids, contact, leaving)
     advice = advise(product, geometry) if order is None else None
     chosen = order or _chosen_order(product, geometry, advice)
     steps, stop = configure_fixing(product, chosen, geometry)
     if stop and (order or product.orders):
         advice = advise(product, geometry, chosen)
+    stages = (*steps, *([stop] if stop else []))
     return FixingPlan(
         product=product.name,
         order=chosen,
@@ -96,22 +113,10 @@ def plan(
         steps=steps,
         stop=stop,
         seconds=time.perf_counter() - started - (advice.seconds if advice else 0.0),
+        evidence=evidence_of(product, matrices, stages, slanted=slanted),
         orders=advice,
         geometry=geometry,
     )
-
-
-def geometry_of(product: Product, tolerance: float = FIT_TOLERANCE) -> Geometry:
-    """Return contact and interference of a product's parts.
-
-    Args:
-        product: Parts in assembled poses.
-        tolerance: Interference that does not block a motion [m].
-    """
-    solids = without_overlaps(product, solids_of(product))
-    listed = list(solids.values())
-    contact = contact_matrix(listed, product.contact_tolerance)
-    return Geometry(solids, contact, interference(listed, tolerance))
 
 
 def _chosen_order(
