@@ -97,9 +97,9 @@ def plan(
     contact, leaving = matrices.contact, matrices.leaving
     geometry = Geometry(matrices.solids, contact, leaving)
     advice = advise(product, geometry) if order is None else None
-    chosen = order or _chosen_order(product, geometry, advice)
+    chosen = _chosen_order(product, geometry, advice) if order is None else order
     steps, stop = configure_fixing(product, chosen, geometry)
-    if stop and (order or product.orders):
+    if stop and (order is not None or product.orders):
         advice = advise(product, geometry, chosen)
     stages = (*steps, *([stop] if stop else []))
     return FixingPlan(
@@ -134,4 +134,6 @@ def _check(product: Product, order: tuple[str, ...] | None) -> None:
         raise CellError(f"Product '{product.name}' has no parts.")
     if product.up not in DIRECTIONS:
         raise UnknownName("up axis", product.up, DIRECTIONS)
-    check_order(product, order or (product.orders[0] if product.orders else product.items()))
+    if order is None:
+        order = product.orders[0] if product.orders else product.items()
+    check_order(product, order)
