@@ -8,12 +8,19 @@ import numpy as np
 import trimesh
 
 from cell.errors import BadPart, CellError, UnknownName
+from cell.repair import repaired
 
 METERS_PER_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
 """Metres per CAD unit, by the name used on the command line."""
 
 MESH_SUFFIXES = (".obj", ".stl", ".ply", ".glb")
 """File types that are read; glTF is in metres by its specification, the others store no unit."""
+
+UNIT_SUFFIXES = (".glb",)
+"""Those of them that are in metres by their specification."""
+
+REPAIR = "repair"
+"""Key of a mesh's metadata: what was done to close its surface, if anything."""
 
 LARGEST_PART = 1.0
 """[m] [D] the reach of the arms is 0.85 m: a longer part is a part in wrong units."""
@@ -38,7 +45,7 @@ def load_mesh(path: Path, name: str, units: str | None = None) -> trimesh.Trimes
     Args:
         path: A file of one of ``MESH_SUFFIXES``.
         name: Name of the part, for the message of an error.
-        units: Unit of the file; None for millimetres, or metres in the case of .glb.
+        units: Unit of the file; None for that of its format, or millimetres if it has none.
 
     Raises:
         BadPart: If it is missing, unreadable, open, flat, or implausibly large or small.
@@ -47,7 +54,7 @@ def load_mesh(path: Path, name: str, units: str | None = None) -> trimesh.Trimes
         raise BadPart(name, f"no mesh file '{path}'")
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise BadPart(name, f"'{path.name}' is not one of {', '.join(MESH_SUFFIXES)}")
-    default = "m" if path.suffix.lower() == ".glb" else "mm"
+    default = "m" if path.suffix.lower() in UNIT_SUFFIXES else "mm"
     mesh = _read(path, name)
     mesh.apply_scale(meters_per_unit(units or default))
     return check_mesh(mesh, name)
@@ -62,6 +69,10 @@ def load_folder(folder: Path, units: str | None = None) -> dict[str, trimesh.Tri
     if not files:
         kinds = ", ".join(MESH_SUFFIXES)
         raise CellError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
+    without = [file.name for file in files if file.suffix.lower() not in UNIT_SUFFIXES]
+    if units is None and without:
+        known = ", ".join(METERS_PER_UNIT)
+        raise CellError(f"'{without[0]}' states no unit of length: add --units, one of {known}.")
     meshes: dict[str, trimesh.Trimesh] = {}
     for file in files:
         if file.stem in meshes:
@@ -71,12 +82,17 @@ def load_folder(folder: Path, units: str | None = None) -> dict[str, trimesh.Tri
 
 
 def check_mesh(mesh: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
-    """Return the mesh, facing outwards, or raise ``BadPart`` if it bounds no plausible solid."""
+    """Return the mesh, facing outwards, or raise ``BadPart`` if it bounds no plausible solid.
+
+    A surface that a safe repair closes is repaired; ``metadata[REPAIR]`` says how.
+    """
     size = float(np.max(mesh.extents)) if len(mesh.faces) else 0.0
-    if not np.isfinite(size) or size == 0.0:
-        raise BadPart(name, "the mesh has no faces")
+    if not np.isfinite(mesh.vertices).all() or size == 0.0:
+        raise BadPart(name, "the mesh has no faces, or corners that are not numbers")
+    mesh, repair = repaired(mesh)
     if not (mesh.is_watertight and mesh.is_winding_consistent):
-        raise BadPart(name, "the mesh is not watertight")
+        raise BadPart(name, "the mesh is not watertight" + _open_edges(mesh))
+    mesh.metadata[REPAIR] = repair
     with np.errstate(invalid="ignore"):  # The centre of mass of nothing is not a number.
         volume = float(mesh.volume)
     if not abs(volume) > 1e-9 * size**3:
@@ -90,6 +106,16 @@ def check_mesh(mesh: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
     return mesh
 
 
+def _open_edges(mesh: trimesh.Trimesh) -> str:
+    """Return how many edges do not belong to two faces, and where the first of them is."""
+    edges, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
+    edges = edges[count != 2]
+    if not len(edges):
+        return ""
+    x, y, z = 1e3 * np.asarray(mesh.vertices)[edges[0]].mean(axis=0)
+    return f": {len(edges)} open edges, one of them at ({x:.3g}, {y:.3g}, {z:.3g}) mm"
+
+
 def _read(path: Path, name: str) -> trimesh.Trimesh:
     """Return the file's surface with coincident vertices joined, in the file's unit."""
     try:
@@ -99,9 +125,14 @@ def _read(path: Path, name: str) -> trimesh.Trimesh:
     mesh = mesh.to_mesh() if isinstance(mesh, trimesh.Scene) else mesh
     if not isinstance(mesh, trimesh.Trimesh):
         raise BadPart(name, f"'{path.name}' holds no surface")
-    joined = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    joined.merge_vertices(merge_norm=True, merge_tex=True)
-    return joined
+    return joined(mesh)
+
+
+def joined(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return a surface with coincident corners joined, whatever normals and colours they have."""
+    surface = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
+    surface.merge_vertices(merge_norm=True, merge_tex=True)
+    return surface
 
 
 def obj_text(mesh: trimesh.Trimesh, *, normals: bool = False) -> str:

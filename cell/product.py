@@ -112,8 +112,10 @@ class Product:
         fasteners: By the name of the bolt.
         fits: Shafts in holes.
         up: Axis of the product frame that points up on the jig: "+x" ... "-z".
-        contact_tolerance: Gap up to which two parts count as touching [m].
+        contact_tolerance: Gap up to which two parts count as touching, and overlap up to which they
+            do not block each other [m]; None to derive it from sizes and clearances.
         tray: Name of the SDF model of the tray that presents the parts, if there is one.
+        remarks: What was assumed or repaired while it was read, a sentence each.
     """
 
     name: str
@@ -123,8 +125,9 @@ class Product:
     fasteners: Mapping[str, Fastener] = field(default_factory=dict)
     fits: tuple[Fit, ...] = ()
     up: str = "+z"
-    contact_tolerance: float = 5e-5
+    contact_tolerance: float | None = None
     tray: str | None = None
+    remarks: tuple[str, ...] = ()
 
     def members(self, item: str) -> tuple[str, ...]:
         """Return the part names behind an item of an order: a group's members, or the part."""

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from cell.simulation import Simulation
+from experiments.html_page import Picture
 from experiments.render import CELL_VIEW, JIG_VIEW, rendering_problem, take_picture
-from experiments.report import Picture
 from experiments.run import StepResult
 
 VIEWS = {"cell": CELL_VIEW, "jig": JIG_VIEW}

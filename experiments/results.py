@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from cell.state import State
+from experiments.html_page import Picture
 from experiments.job import Job
 from experiments.metrics.bolts import thread_curve
 from experiments.metrics.insert import INSERTION_PHASES, insertion_curve
@@ -18,7 +19,7 @@ from experiments.pictures import Pictures
 from experiments.plots import plot_force_plate, plot_insertion_force, plot_torque
 from experiments.prepare import Disturbance
 from experiments.record import Arrays, OperationRecord, rows_of
-from experiments.report import Picture, write_report
+from experiments.report import write_report
 from experiments.run import Run, StepResult, final_state
 from planning.fixing.plan_file import plan_to_dict
 from planning.fixing.planner import FixingPlan

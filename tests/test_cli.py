@@ -9,6 +9,7 @@ import pytest
 
 from cell.errors import BadOrder, CellError
 from experiments.cli import main, one_line, parse
+from experiments.plan_options import PlanOptions
 
 
 @pytest.fixture
@@ -16,11 +17,13 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
     """Put stand-ins in the place of the two commands; return the calls that they get."""
     calls = []
 
-    def run_plan(product, order, units, explain, out):
+    def run_plan(product, order, options, explain, out, *, config, html):
         if order == ("unknown",):
             raise BadOrder("No such part.")
         print("a table")
-        calls.append(dict(product=product, order=order, units=units, explain=explain))
+        calls.append(
+            dict(product=product, order=order, options=options, explain=explain, html=html)
+        )
         (out / "plan.json").write_text("{}")
         return 1 if product == "stuck" else 0
 
@@ -37,9 +40,22 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
 
 def test_plan_gets_its_options(calls: list[dict], tmp_path: Path) -> None:
     options = ["--order", "a,b", "--units", "in", "--explain", "--out", str(tmp_path)]
-    assert main(["plan", "folder", *options]) == 0
-    assert calls == [dict(product="folder", order=("a", "b"), units="in", explain=True)]
+    options += ["--density", "7850", "--density", "a=1000", "--group", "--tolerance-mm", "0.02"]
+    assert main(["plan", "folder", *options, "--no-cache", "--no-html"]) == 0
+    expected = PlanOptions("in", {"": 7850.0, "a": 1000.0}, True, 1e-3 * 0.02)
+    (call,) = calls
+    assert call == dict(
+        product="folder", order=("a", "b"), options=expected, explain=True, html=False
+    )
+    assert main(["plan", "folder", "--out", str(tmp_path)]) == 0
+    assert calls[1]["html"] is True
     assert (tmp_path / "plan.json").exists()
+
+
+def test_matrices_are_kept_in_the_users_cache(calls, tmp_path, monkeypatch) -> None:
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    assert main(["plan", "folder", "--out", str(tmp_path)]) == 0
+    assert calls[0]["options"] == PlanOptions(cache=tmp_path / "cache" / "soft-jig")
 
 
 def test_assemble_gets_its_options(calls: list[dict], tmp_path: Path) -> None:

@@ -10,12 +10,14 @@ from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_th
 from cell.errors import BadPart, CellError
 from cell.product import Product
 from planning.fixing.checks import overlap_depth, without_overlaps
-from planning.fixing.contact import contact_matrix, surface_gap
+from planning.fixing.contact import contact_matrix, gap_matrix, surface_gap
 from planning.fixing.solids import Solid, cog_height, combined_cog, solids_of
+
+TOLERANCE = 5e-5
 
 
 def contact(product: Product) -> np.ndarray:
-    return contact_matrix(list(solids_of(product).values()), product.contact_tolerance)
+    return contact_matrix(gap_matrix(list(solids_of(product).values()), 1e-4), TOLERANCE)
 
 
 def two_blocks(gap: float) -> Product:
@@ -71,7 +73,7 @@ def test_a_part_loose_in_a_cavity_is_not():
 def test_overlapping_parts_are_refused_by_name(depth):
     product = two_blocks(-depth)
     with pytest.raises(CellError, match="'low' and 'high' overlap by .* mm"):
-        without_overlaps(product, solids_of(product))
+        without_overlaps(product, solids_of(product), TOLERANCE)
 
 
 def test_contained_parts_are_refused():
@@ -79,13 +81,13 @@ def test_contained_parts_are_refused():
         {"block": box((20, 20, 20), (0, 0, 0)), "seed": rod(4, 8, 12).translate([10, 10, 0])}
     )
     with pytest.raises(CellError, match="'block' and 'seed'"):
-        without_overlaps(product, solids_of(product))
+        without_overlaps(product, solids_of(product), TOLERANCE)
 
 
 @pytest.mark.parametrize("gap", [0.0, -0.04, 1.0])
 def test_overlap_within_the_tolerance_is_accepted(gap):
     product = two_blocks(gap)
-    without_overlaps(product, solids_of(product))
+    without_overlaps(product, solids_of(product), TOLERANCE)
 
 
 def test_depth_of_a_thin_layer_is_its_thickness():
@@ -96,16 +98,17 @@ def test_depth_of_a_thin_layer_is_its_thickness():
 
 def test_thread_drawn_at_the_tap_drill_is_cut_for_a_declared_fastener():
     product = bolted(thread=2.5)
-    solids = without_overlaps(product, solids_of(product))
+    solids, threads = without_overlaps(product, solids_of(product), TOLERANCE)
+    assert [(thread.bolt, thread.nut) for thread in threads] == [("bolt", "base")]
     assert solids["base"].manifold.volume() < solids_of(product)["base"].manifold.volume()
-    assert contact_matrix(list(solids.values()), product.contact_tolerance)[0, 2] == 1
+    assert contact_matrix(gap_matrix(list(solids.values()), 1e-4), TOLERANCE)[0, 2] == 1
 
 
 def test_a_bolt_far_thicker_than_its_hole_is_refused():
     """Overlap of 1 mm is no thread of pitch 0.5 mm."""
     product = bolted(thread=1.0)
     with pytest.raises(CellError, match="'base' and 'bolt'"):
-        without_overlaps(product, solids_of(product))
+        without_overlaps(product, solids_of(product), TOLERANCE)
 
 
 def test_combined_cog_weighs_by_mass():

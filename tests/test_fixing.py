@@ -132,7 +132,8 @@ def test_posture_is_the_lowest_of_those_that_keep_the_product_up(heights, postur
 def test_up_of_the_product_decides_which_part_is_at_the_bottom():
     """The same peg from above, from below, and from the side."""
     peg = peg_in_hole()
-    fixed = {up: choices(plan(replace(peg, up=up)))[0][1] for up in ("+z", "-z", "+x")}
+    order = ("block", "peg")
+    fixed = {up: choices(plan(replace(peg, up=up), order))[0][1] for up in ("+z", "-z", "+x")}
     assert fixed == {"+z": "block", "-z": "peg", "+x": "block"}
 
 

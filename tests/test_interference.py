@@ -17,6 +17,7 @@ from tiny_products import (
     tube_and_pins,
 )
 
+from planning.fixing.blocking import FRAGILE, decisions
 from planning.fixing.directions import DIRECTIONS, opposite, unit_vector
 from planning.fixing.envelope import envelope
 from planning.fixing.interference import FIT_TOLERANCE, first_hit, interference
@@ -170,15 +171,62 @@ def shadows_meet(a: Manifold, b: Manifold, axis: int) -> bool:
     return bool(np.all(np.delete(overlap, axis) >= 0.0))
 
 
-def test_exact_test_agrees_with_boolean_sweeps():
-    """200 random pairs, with enough of both answers and of touching pairs to mean something."""
-    blocked, touching = 0, 0
-    for moving, staying, axis in random_pairs(200):
-        expected = is_blocked(moving, staying, axis, 1e3 * FIT_TOLERANCE)
-        views = envelope(solid(moving), axis), envelope(solid(staying), axis)
+CLEARANCES = (-0.6, -0.3, 0.0, 0.02, 0.04, 0.1, 0.3, 1.0)
+"""[mm] Of a peg's diameter in its hole; 0 is line to line with facets that need not match."""
+
+
+def random_fit(rng: np.random.Generator) -> tuple[Manifold, Manifold, int]:
+    """A peg in a blind or through hole, off its centre within the clearance, in any direction."""
+    diameter, clearance = float(rng.integers(4, 14)), float(rng.choice(CLEARANCES))
+    depth = float(rng.choice([-1.0, 4.0]))
+    block = box((30, 30, 20), (-15, -15, 0)) - rod(
+        diameter, depth, 25, int(rng.choice([32, 48, 64, 96]))
+    )
+    play = max(0.0, clearance) / 2
+    angle, share = rng.uniform(0, 2 * np.pi), float(rng.choice([0.0, 0.5, 1.0]))
+    shift = [share * play * np.cos(angle), share * play * np.sin(angle), 0.0]
+    peg = rod(diameter - clearance, max(depth, -5), 35, int(rng.choice([32, 48, 64])))
+    turn = [(0, 0, 0), (0, 90, 0), (90, 0, 0)][rng.integers(3)]
+    pair = [peg.translate(shift).rotate(list(turn)), block.rotate(list(turn))]
+    moving, staying = pair if rng.random() < 0.5 else pair[::-1]
+    return moving, staying, int(rng.integers(3))
+
+
+def agreement(pairs: list[tuple[Manifold, Manifold, int]]) -> tuple[int, int, int]:
+    """Compare with the oracle; return how many were blocked, touching, and fragile.
+
+    A fragile decision flips within 40 % of the tolerance: the oracle clears the depth by moving
+    one part instead of by comparing heights, which differs where walls are steep, and it is not
+    asked to agree there.
+    """
+    blocked, touching, fragile = 0, 0, 0
+    for moving, staying, axis in pairs:
+        views = [envelope(solid(moving), axis), envelope(solid(staying), axis)]
+        found = decisions(views, FIT_TOLERANCE).get((0, 1))
+        if found is not None and found.margin < 0.999 * FRAGILE * FIT_TOLERANCE:
+            fragile += 1
+            continue
         hit = first_hit(views[0], views[1], "+" + "xyz"[axis])
+        expected = is_blocked(moving, staying, axis, 1e3 * FIT_TOLERANCE)
         assert (hit is not None) == expected
         blocked += expected
         touching += moving.min_gap(staying, 1.0) == 0.0 and (moving ^ staying).volume() < 1e-9
-    assert 40 < blocked < 160
-    assert touching > 10
+    return blocked, touching, fragile
+
+
+def random_fits(count: int) -> list[tuple[Manifold, Manifold, int]]:
+    rng = np.random.default_rng(1)
+    return [random_fit(rng) for _ in range(count)]
+
+
+def test_exact_test_agrees_with_boolean_sweeps():
+    """120 random pairs, with enough of both answers and of touching pairs to mean something."""
+    blocked, touching, fragile = agreement(random_pairs(100) + random_fits(20))
+    assert 25 < blocked < 95 and touching > 5 and fragile < 6
+
+
+@pytest.mark.slow
+def test_exact_test_agrees_with_500_boolean_sweeps():
+    """300 pairs on a grid, many of them touching, and 200 fits from press to 1 mm of play."""
+    blocked, touching, fragile = agreement(random_pairs(300) + random_fits(200))
+    assert 100 < blocked < 400 and touching > 15 and fragile < 15

@@ -70,10 +70,8 @@ def test_yaml_reads_units_poses_and_masses(folder: Path) -> None:
     np.testing.assert_allclose(peg.X_AP.rotation().matrix()[:, 0], [0, 1, 0], atol=1e-12)
 
 
-@pytest.mark.parametrize(("units", "size"), [(None, 0.02), ("mm", 0.02), ("cm", 0.2)])
-def test_folder_is_a_product_in_assembled_pose(
-    folder: Path, units: str | None, size: float
-) -> None:
+@pytest.mark.parametrize(("units", "size"), [("mm", 0.02), ("cm", 0.2)])
+def test_folder_is_a_product_in_assembled_pose(folder: Path, units: str, size: float) -> None:
     product = load_product(folder, units=units)
     assert list(product.parts) == ["block", "peg"]
     np.testing.assert_allclose(product.parts["block"].mesh.extents, [size] * 3)
@@ -83,11 +81,11 @@ def test_folder_is_a_product_in_assembled_pose(
 
 @pytest.mark.parametrize("suffix", MESH_SUFFIXES)
 def test_every_supported_type_is_read(tmp_path: Path, suffix: str) -> None:
-    """GLB is in metres by its specification, the others are taken as millimetres."""
+    """GLB is in metres by its specification, the others state no unit."""
     scale = 1e-3 if suffix == ".glb" else 1.0
     cube = trimesh.creation.box((20 * scale,) * 3)
     cube.export(tmp_path / f"cube{suffix}")
-    part = load_product(tmp_path).parts["cube"]
+    part = load_product(tmp_path, None if suffix == ".glb" else "mm").parts["cube"]
     assert part.mesh.is_volume
     np.testing.assert_allclose(part.mesh.extents, [0.02] * 3, rtol=1e-6)
 
@@ -96,7 +94,7 @@ def test_inward_surface_is_turned_outwards(tmp_path: Path) -> None:
     cube = trimesh.creation.box((20, 20, 20))
     cube.invert()
     cube.export(tmp_path / "cube.ply")
-    assert load_product(tmp_path).parts["cube"].mesh.volume == pytest.approx(8e-6)
+    assert load_product(tmp_path, "mm").parts["cube"].mesh.volume == pytest.approx(8e-6)
 
 
 def test_unknown_product_names_the_nearest() -> None:
@@ -105,10 +103,12 @@ def test_unknown_product_names_the_nearest() -> None:
 
 
 def test_unsupported_input_lists_what_is(folder: Path) -> None:
-    (folder / "pair.step").write_text("ISO-10303-21;")
+    (folder / "pair.iges").write_text("")
     with pytest.raises(CellError, match=r"not a product; supported: .*yaml.*folder of meshes"):
-        load_product(folder / "pair.step")
+        load_product(folder / "pair.iges")
     with pytest.raises(CellError, match="does not exist"):
+        load_product(folder / "nowhere" / "thing.iges")
+    with pytest.raises(CellError, match="No product file"):
         load_product(folder / "nowhere" / "thing.step")
 
 
@@ -133,7 +133,7 @@ def test_implausible_size_is_refused(folder: Path, units: str, message: str | No
 def test_tiny_part_is_refused(tmp_path: Path) -> None:
     trimesh.creation.box((0.02,) * 3).export(tmp_path / "cube.stl")
     with pytest.raises(BadPart, match="cube.*micrometres.*wrong units"):
-        load_product(tmp_path)
+        load_product(tmp_path, "mm")
     assert load_product(tmp_path, units="m")
 
 
@@ -146,16 +146,16 @@ def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
     for mesh, reason in [(hole, "not watertight"), (flat, "no volume|not watertight")]:
         mesh.export(tmp_path / "part.obj")
         with pytest.raises(BadPart, match=f"'part'.*({reason})"):
-            load_product(tmp_path)
+            load_product(tmp_path, "mm")
     (tmp_path / "part.obj").write_text("v 0 0\nf nonsense\n")
     with pytest.raises(BadPart, match="'part'"):
-        load_product(tmp_path)
+        load_product(tmp_path, "mm")
 
 
 def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -> None:
     trimesh.creation.box((5, 5, 5)).export(folder / "peg.obj")
     with pytest.raises(BadPart, match="'peg'.*two files"):
-        load_product(folder)
+        load_product(folder, "mm")
     empty = tmp_path / "empty"
     empty.mkdir()
     with pytest.raises(CellError, match="no mesh; supported: .obj"):

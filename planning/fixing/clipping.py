@@ -50,23 +50,28 @@ class Polygons:
         valid = np.arange(self.corners.shape[1]) < self.count[:, None]
         return np.where(valid[:, :, None], self.corners, self.corners[:, :1])
 
-    def areas(self) -> np.ndarray:
-        """Return the areas, (n,) [m^2]."""
-        corners = self.closed()
-        return 0.5 * cross(corners, np.roll(corners, -1, axis=1)).sum(axis=1)
-
     def inradius_bounds(self) -> np.ndarray:
         """Return a lower bound on each polygon's inscribed radius, area over perimeter [m]."""
+        areas, perimeters = self.areas_and_perimeters()
+        return np.divide(areas, perimeters, out=np.zeros_like(areas), where=perimeters > 0.0)
+
+    def areas_and_perimeters(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return both for each polygon, (n,) [m^2] and (n,) [m]."""
         corners = self.closed()
-        edges = np.roll(corners, -1, axis=1) - corners
-        perimeter = np.linalg.norm(edges, axis=2).sum(axis=1)
-        return np.divide(self.areas(), perimeter, out=0.0 * perimeter, where=perimeter > 0.0)
+        # From the first corner, to lose no digits far from the origin.
+        x, y = corners[..., 0] - corners[:, :1, 0], corners[..., 1] - corners[:, :1, 1]
+        following = np.r_[1 : x.shape[1], 0]
+        x_next, y_next = x[:, following], y[:, following]
+        areas = 0.5 * np.einsum("ij->i", x * y_next - x_next * y)
+        return areas, np.einsum("ij->i", np.hypot(x_next - x, y_next - y))
 
-    def centre(self, index: int) -> np.ndarray:
-        """Return a point (2,) inside one polygon: the mean of its corners."""
-        return self.corners[index, : self.count[index]].mean(axis=0)
+    def centres(self) -> np.ndarray:
+        """Return a point (n, 2) inside each polygon that has an area: the mean of its corners."""
+        valid = np.arange(self.corners.shape[1]) < self.count[:, None]
+        total = np.einsum("ijk,ij->ik", self.corners, valid.astype(float))
+        return total / np.maximum(self.count, 1)[:, None]
 
-    def chosen(self, which: np.ndarray) -> Polygons:
+    def chosen(self, which: np.ndarray | slice) -> Polygons:
         """Return the polygons at the given indices or mask."""
         return Polygons(self.corners[which], self.count[which])
 

@@ -1,10 +1,10 @@
 """Contact matrix C: which parts touch in the assembled product.
 
-Two parts touch when their surfaces are no further apart than the product's contact tolerance, or
-when one lies in the other's material. The tolerance (0.05 mm unless the product says otherwise)
-is declared because CAD puts a gap into every fit: choose it above the gaps that mean "touches"
-(line-to-line faces: rounding, 1e-9 m) and below the clearances that do not (0.075 mm radial between
-boss and bore, 0.2 mm between bolt and clearance hole).
+Two parts touch when their surfaces are no further apart than the product's tolerance, or when one
+lies in the other's material. The tolerance is declared, or derived from the product, because CAD
+puts a gap into every fit: it lies above the gaps that mean "touches" (line-to-line faces: rounding,
+1e-9 m) and below the clearances that do not (0.075 mm radial between boss and bore, 0.2 mm between
+bolt and clearance hole).
 
 Distances come from FCL's triangle BVH. Compared with coal's ``security_margin`` on motor, plate and
 six bolts lifted apart by 0 ... 0.3 mm, every answer was the same, at 10-38 ms a product against
@@ -14,12 +14,11 @@ six bolts lifted apart by 0 ... 0.3 mm, every answer was the same, at 10-38 ms a
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import fcl
 import numpy as np
 
-from planning.fixing.solids import Solid, boxes_apart
+from planning.fixing.solids import Solid
 
 
 def surface_gap(a: Solid, b: Solid) -> float:
@@ -35,25 +34,36 @@ def one_inside_other(a: Solid, b: Solid) -> bool:
     return bool(a_in_b or b_in_a) and (a.manifold ^ b.manifold).volume() > 0.0
 
 
-def in_contact(a: Solid, b: Solid, tolerance: float) -> bool:
-    """Say whether two parts touch: surfaces within the tolerance [m], or one inside the other."""
-    if boxes_apart(a, b, tolerance):
-        return False
-    return surface_gap(a, b) <= tolerance or one_inside_other(a, b)
-
-
-def contact_matrix(solids: Sequence[Solid], tolerance: float) -> np.ndarray:
-    """Return C of the paper.
+def gap_matrix(solids: Sequence[Solid], reach: float) -> np.ndarray:
+    """Return how far apart parts are, where that is near.
 
     Args:
         solids: The n parts, in matrix order.
+        reach: Gap beyond which the distance does not matter [m].
+
+    Returns:
+        (n, n) [m], symmetric: 0 where parts touch or one lies in the other's material, infinity
+        where their bounding boxes are further apart than the reach, and on the diagonal.
+    """
+    gaps = np.full((len(solids), len(solids)), np.inf)
+    lower, upper = np.array([s.lower for s in solids]), np.array([s.upper for s in solids])
+    near = (lower[:, None] - upper[None]).max(axis=2) <= reach
+    for i, k in np.argwhere(np.triu(near & near.T, 1)):
+        gap = surface_gap(solids[i], solids[k])
+        inside = gap > 0.0 and one_inside_other(solids[i], solids[k])
+        gaps[i, k] = gaps[k, i] = 0.0 if inside else gap
+    return gaps
+
+
+def contact_matrix(gaps: np.ndarray, tolerance: float) -> np.ndarray:
+    """Return C of the paper.
+
+    Args:
+        gaps: (n, n) as ``gap_matrix`` returns them [m].
         tolerance: Gap up to which two parts count as touching [m].
 
     Returns:
         (n, n) int, strictly upper triangular: C[i, k] = 1 if i < k and part i touches part k. Kept
         triangular so that C + C^T holds no 2.
     """
-    matrix = np.zeros((len(solids), len(solids)), int)
-    for i, k in combinations(range(len(solids)), 2):
-        matrix[i, k] = in_contact(solids[i], solids[k], tolerance)
-    return matrix
+    return np.triu(gaps <= tolerance, 1).astype(int)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -18,26 +19,45 @@ WALL_SLOPE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class Faces:
-    """Triangles that all face up, or all face down, projected along the axis.
+    """Triangles that all face up, or all face down, projected along the axis, widest first.
 
     Attributes:
+        facing: +1 up, -1 down.
         corners: (m, 3, 2) projections on the (u, v) plane, counter-clockwise [m].
         planes: (m, 3) rows (g, k, c) with height = g u + k v + c [m].
         low, high: (m, 3) bounding boxes in (u, v, h) [m].
     """
 
+    facing: int
     corners: np.ndarray
     planes: np.ndarray
     low: np.ndarray
     high: np.ndarray
 
+    @cached_property
+    def lower(self) -> np.ndarray:
+        """(3,) lower corner of the faces' common bounding box [m]."""
+        return self.low.min(axis=0)
+
+    @cached_property
+    def upper(self) -> np.ndarray:
+        """(3,) upper corner of the faces' common bounding box [m]."""
+        return self.high.max(axis=0)
+
+    def chosen(self, which: np.ndarray) -> Faces:
+        """Return the faces at the given indices."""
+        corners, planes = self.corners[which], self.planes[which]
+        return Faces(self.facing, corners, planes, self.low[which], self.high[which])
+
     def heights_over(self, point: np.ndarray) -> np.ndarray:
         """Return the heights at which these faces cross the vertical line over (u, v)."""
-        near = np.all((self.low[:, :2] <= point) & (self.high[:, :2] >= point), axis=1)
-        corners = self.corners[near]
-        edges = np.roll(corners, -1, axis=1) - corners
-        inside = np.all(cross(edges, point - corners) >= 0.0, axis=1)
-        return self.planes[near][inside] @ np.append(point, 1.0)
+        u, v = point
+        near = (self.low[:, 0] <= u) & (self.high[:, 0] >= u)
+        near = np.flatnonzero(near & (self.low[:, 1] <= v) & (self.high[:, 1] >= v))
+        x, y = self.corners[near, :, 0] - u, self.corners[near, :, 1] - v
+        turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
+        inside = near[(turns[:, 0] >= 0.0) & (turns[:, 1] >= 0.0) & (turns[:, 2] >= 0.0)]
+        return self.planes[inside] @ np.array([u, v, 1.0])
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +90,20 @@ def envelope(solid: Solid, axis: int) -> Envelope:
     normals = np.cross(edges[:, 0], edges[:, 1])
     lengths = np.linalg.norm(normals, axis=1)
     slopes = np.divide(normals[:, 2], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
-    up = _faces(triangles[slopes > WALL_SLOPE])
-    down = _faces(triangles[slopes < -WALL_SLOPE][:, ::-1])
+    up = _faces(triangles[slopes > WALL_SLOPE], 1)
+    down = _faces(triangles[slopes < -WALL_SLOPE][:, ::-1], -1)
     corners = solid.vertices[:, PLANE[axis]]
     return Envelope(solid.name, up, down, corners.min(axis=0), corners.max(axis=0))
 
 
-def _faces(triangles: np.ndarray) -> Faces:
+def _faces(triangles: np.ndarray, facing: int) -> Faces:
     """Project (m, 3, 3) triangles in (u, v, h), counter-clockwise seen from above."""
     e1, e2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     area2 = cross(e1, e2)
+    order = np.argsort(-area2, kind="stable")
+    triangles, e1, e2, area2 = triangles[order], e1[order], e2[order], area2[order]
     g = (e1[:, 2] * e2[:, 1] - e2[:, 2] * e1[:, 1]) / area2
     k = (e1[:, 0] * e2[:, 2] - e2[:, 0] * e1[:, 2]) / area2
     c = triangles[:, 0, 2] - g * triangles[:, 0, 0] - k * triangles[:, 0, 1]
     planes = np.stack([g, k, c], axis=1)
-    return Faces(triangles[:, :, :2], planes, triangles.min(axis=1), triangles.max(axis=1))
+    return Faces(facing, triangles[:, :, :2], planes, triangles.min(axis=1), triangles.max(axis=1))

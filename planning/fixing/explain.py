@@ -11,6 +11,7 @@ from planning.fixing.algorithm import READING, FixingStep, Stop
 from planning.fixing.directions import DIRECTIONS, open_directions
 from planning.fixing.interference import Blocker
 from planning.fixing.planner import FixingPlan
+from planning.ordering.explain import precedence_text
 
 
 def step_table(plan: FixingPlan) -> Table:
@@ -53,6 +54,7 @@ def explanation(plan: FixingPlan) -> str:
         *(f"M_{j}:\n" + matrix_text(plan.parts, plan.free[j]) for j in DIRECTIONS),
         "Reachable W_j = (C + C^T) * M_j",
         *(f"W_{j}:\n" + matrix_text(plan.parts, plan.reachable[j]) for j in DIRECTIONS),
+        *([precedence_text(plan.orders)] if plan.orders and plan.orders.ranked else []),
         "Steps:\n" + "\n".join(step_text(step) for step in plan.steps),
         "Reading: " + READING,
         "Blocked, with a point of the part that stays, in the product frame:\n"

@@ -1,4 +1,4 @@
-"""Assembly orders: the default, and the check against the product."""
+"""The check of an assembly order against the product."""
 
 from __future__ import annotations
 
@@ -6,11 +6,6 @@ from collections import Counter
 
 from cell.errors import BadOrder
 from cell.product import Product
-
-
-def default_order(product: Product) -> tuple[str, ...]:
-    """Return the product's first order, or all items in part order if it states none."""
-    return product.orders[0] if product.orders else product.items()
 
 
 def check_order(product: Product, order: tuple[str, ...]) -> None:

@@ -14,8 +14,10 @@ import numpy as np
 from cell.errors import CellError
 from planning.fixing.algorithm import READING, FixingStep, Stop
 from planning.fixing.directions import DIRECTIONS
+from planning.fixing.evidence import evidence_from_dict, evidence_to_dict
 from planning.fixing.interference import Blocker
 from planning.fixing.planner import FixingPlan
+from planning.ordering.advice_file import advice_from_dict, advice_to_dict
 
 
 def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
@@ -32,7 +34,9 @@ def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
         "steps": [_step_to_dict(step) for step in plan.steps],
         "stopped": _stop_to_dict(plan.stop) if plan.stop else None,
         "blockers": [_blocker_to_dict(blocker) for blocker in plan.blockers],
+        "orders": advice_to_dict(plan.orders) if plan.orders else None,
         "seconds": plan.seconds,
+        "evidence": evidence_to_dict(plan.evidence) if plan.evidence else None,
     }
 
 
@@ -49,16 +53,23 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
         steps=tuple(_step_from_dict(step) for step in data["steps"]),
         stop=_stop_from_dict(data["stopped"]) if data["stopped"] else None,
         seconds=data["seconds"],
+        orders=advice_from_dict(data["orders"]) if data["orders"] else None,
+        evidence=evidence_from_dict(data["evidence"]) if data["evidence"] else None,
     )
 
 
-def save_plan(plan: FixingPlan, file: Path) -> None:
-    """Write a plan; the file appears only when it is complete."""
+def save_plan(plan: FixingPlan, file: Path, **sections: Any) -> None:
+    """Write a plan; the file appears only when it is complete.
+
+    Args:
+        plan: The plan.
+        file: ``plan.json``.
+        sections: More of it, plain values by name, which ``load_plan`` leaves alone.
+    """
     partial = file.with_name(file.name + ".part")
     # One line per key: a matrix row on a line each would run to 100 000 lines for 100 parts.
-    lines = [
-        f" {json.dumps(key)}: {json.dumps(value)}" for key, value in plan_to_dict(plan).items()
-    ]
+    data = plan_to_dict(plan) | sections
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items()]
     partial.write_text("{\n" + ",\n".join(lines) + "\n}\n")
     os.replace(partial, file)
 

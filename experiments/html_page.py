@@ -1,0 +1,78 @@
+"""The pieces that a self-contained HTML page is made of."""
+
+from __future__ import annotations
+
+import base64
+from collections.abc import Iterable, Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+Picture = tuple[str, bytes]  # Caption and PNG.
+STYLE = Path(__file__).with_name("report.css")
+VERDICTS = ("success", "failure")
+
+
+def page(title: str, body: str) -> str:
+    """Return a whole page that holds its style."""
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width">\n<title>{escape(title)}</title>\n'
+        f"<style>\n{STYLE.read_text()}</style>\n</head>\n<body>\n{body}\n</body>\n</html>\n"
+    )
+
+
+def section(heading: str, content: str) -> str:
+    """Return a heading and what follows it; nothing where there is nothing."""
+    return f"<h2>{heading}</h2>\n{content}" if content else ""
+
+
+def figures(pictures: Iterable[Picture]) -> str:
+    """Return pictures with their captions."""
+    return "\n".join(
+        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,'
+        f'{base64.b64encode(png).decode()}"><figcaption>{escape(caption)}</figcaption></figure>'
+        for caption, png in pictures
+    )
+
+
+def table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
+    """One line per row, with those of the columns that any row has."""
+    used = [column for column in columns if any(column in row for row in rows)]
+    if not used:
+        return ""
+    head = "".join(f"<th>{escape(words(column))}</th>" for column in used)
+    lines = ["".join(_td(row.get(column)) for column in used) for row in rows]
+    body = "\n".join(f"<tr>{line}</tr>" for line in lines)
+    return f'<div class="wide"><table>\n<tr>{head}</tr>\n{body}\n</table></div>'
+
+
+def pairs(values: Mapping[str, Any]) -> str:
+    """Return names and values, one line each."""
+    rows = [f"<tr><th>{escape(words(key))}</th>{_td(value)}</tr>" for key, value in values.items()]
+    return f"<table>\n{''.join(rows)}\n</table>" if rows else ""
+
+
+def _td(value: Any) -> str:
+    number = isinstance(value, int | float) and not isinstance(value, bool)
+    return f'<td class="number">{cell(value)}</td>' if number else f"<td>{cell(value)}</td>"
+
+
+def cell(value: Any) -> str:
+    """Return a value as HTML text: verdicts coloured, numbers short, lists and 0/1 maps joined."""
+    if value is None:
+        return ""
+    if value in VERDICTS:
+        return f'<span class="verdict {value}">{value}</span>'
+    if isinstance(value, float):
+        return f"{value:.4g}"
+    if isinstance(value, Mapping):
+        return escape(", ".join(str(key) for key, item in value.items() if item)) or "none"
+    if isinstance(value, list | tuple):
+        return escape(", ".join(map(str, value)))
+    return escape(str(value))
+
+
+def words(name: str) -> str:
+    """Return the name of a quantity as words."""
+    return name.replace("_", " ")

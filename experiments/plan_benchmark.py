@@ -1,0 +1,175 @@
+"""How long the planner's matrices take: ``python -m experiments.plan_benchmark``.
+
+Five products, CPU seconds after import and without reading files. "Matrices" is all from meshes to
+C, M_j and their margins, with the overlap check; "contact" is the distances' share of it; "again"
+is the same from the cache, content check included. Set OPENBLAS_NUM_THREADS=1 to be strict about
+one core: a few matrix products may use more.
+"""
+
+from __future__ import annotations
+
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import trimesh
+from manifold3d import Manifold, Mesh64, OpType
+from pydrake.math import RigidTransform
+from rich.console import Console
+from rich.table import Table
+
+from cell.loading import load_product
+from cell.product import Part, Product
+from planning.fixing.cache import cached_matrices
+from planning.fixing.contact import gap_matrix
+from planning.fixing.solids import solids_of
+
+STATION = 30.0  # [mm] Pitch of the stations of the bench assemblies.
+
+
+def motor_unit() -> Product:
+    """The paper's product: motor, plate, six bolts."""
+    return load_product("motor_unit")
+
+
+def perforated() -> Product:
+    """Two perforated plates with a spacer between them, a shaft through all, and a collar."""
+    plate = _perforated_plate(0)
+    shapes = {
+        "plate_1": plate,
+        "plate_2": plate.translate([0, 0, 20]),
+        "spacer": _perforated_plate(5, depth=15),
+        "shaft": _rod(12, -20, 60, 256),
+        "collar": _rod(24, 25, 35, 200) - _rod(12, 20, 40, 200),
+    }
+    return _product("perforated", shapes)
+
+
+def bench(stations: int) -> Product:
+    """A base plate with rows of stations of four: bush, bracket, headed pin, cap; one cap left out.
+
+    All fits are line to line, with facets that do not match.
+    """
+    side = int(np.ceil(np.sqrt(stations)))
+    base = Manifold.cube([side * STATION, side * STATION, 10]).translate([-15, -15, -10])
+    shapes: dict[str, Manifold] = {}
+    for number in range(stations):
+        place = [STATION * (number % side), STATION * (number // side), 0]
+        base -= _rod(8, -8, 1, 48).translate(place)
+        for name, shape in _station().items():
+            shapes[f"{name}_{number + 1}"] = shape.translate(place)
+    shapes.popitem()
+    return _product(f"bench_{stations}", {"base": base} | shapes)
+
+
+def freeform(cells: int = 70) -> Product:
+    """Six layers that lie on each other on wavy surfaces, each tessellated differently."""
+    shapes = {f"layer_{k}": _layer(k, cells + 3 * (k % 3)) for k in range(6)}
+    return _product("freeform", shapes)
+
+
+CASES: dict[str, tuple[Callable[[], Product], float]] = {
+    "motor unit": (motor_unit, 0.1),
+    "perforated plates": (perforated, 0.15),
+    "bench, 5 stations": (lambda: bench(5), 0.3),
+    "bench, 25 stations": (lambda: bench(25), 2.0),
+    "wavy layers": (freeform, 1.0),
+}
+"""Product and aim in CPU seconds, by name."""
+
+
+def main() -> None:
+    """Time every case and print the table."""
+    table = Table(title="CPU seconds of the planner", title_justify="left")
+    for heading in ("product", "parts", "triangles", "contact", "matrices", "aim", "again"):
+        table.add_column(heading, justify="left" if heading == "product" else "right")
+    for name, (make, aim) in CASES.items():
+        product = make()
+        triangles = sum(len(part.mesh.faces) for part in product.parts.values())
+        contact, first, again = (f"{seconds:.3f}" for seconds in timed(product))
+        count = len(product.parts)
+        table.add_row(name, str(count), str(triangles), contact, first, f"{aim:g}", again)
+    Console().print(table)
+
+
+def timed(product: Product) -> tuple[float, float, float]:
+    """Return CPU seconds for distances, for all matrices, and for them from the cache."""
+    with tempfile.TemporaryDirectory() as folder:
+        marks = [time.process_time()]
+        gap_matrix(list(solids_of(product).values()), 7e-5)
+        marks.append(time.process_time())
+        cached_matrices(product, None, Path(folder))
+        marks.append(time.process_time())
+        cached_matrices(product, None, Path(folder))
+        marks.append(time.process_time())
+    contact, first, again = np.diff(marks)
+    return contact, first, again
+
+
+def _perforated_plate(z: float, depth: float = 5.0) -> Manifold:
+    holes = [
+        _rod(6, z - 1, z + depth + 1, 64).translate([15 * i - 67.5, 15 * k - 37.5, 0])
+        for i in range(10)
+        for k in range(6)
+    ]
+    body = Manifold.cube([160, 100, depth]).translate([-80, -50, z]) - _rod(12, z - 1, z + 30, 96)
+    return body - Manifold.batch_boolean(holes, OpType.Add)
+
+
+def _station() -> dict[str, Manifold]:
+    bush = _rod(8, -8, 12, 96) - _rod(5, -8, 12, 64)
+    bracket = Manifold.cube([24, 24, 8]).translate([-12, -12, 0]) - _rod(8, -1, 9, 80)
+    for x in (-9, 9):
+        for y in (-9, 9):
+            bracket -= _rod(3, -1, 9, 24).translate([x, y, 0])
+    pin = _rod(5, -8, 14, 100) + _rod(10, 12, 16, 100)
+    cap = _rod(14, 8, 20, 80) - _rod(10, 7, 16, 80)
+    return {"bush": bush, "bracket": bracket, "pin": pin, "cap": cap}
+
+
+def _layer(level: int, cells: int) -> Manifold:
+    """A slab between two wavy surfaces, 12 mm apart, 100 mm square."""
+    u = np.linspace(-50, 50, cells + 1)
+    x, y = (grid.ravel() for grid in np.meshgrid(u, u, indexing="ij"))
+    low = 12.0 * level + _wave(x, y)
+    vertices = np.concatenate([np.c_[x, y, low], np.c_[x, y, low + 12.0]])
+    index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
+    a, b, c, d = (index[i : i + cells, k : k + cells].ravel() for i in (0, 1) for k in (0, 1))
+    top = np.concatenate([np.c_[a, c, d], np.c_[a, d, b]])
+    rim = np.concatenate([index[:-1, 0], index[-1, :-1], index[:0:-1, -1], index[0, :0:-1]])
+    after, above = np.roll(rim, -1), len(x)
+    walls = np.concatenate(
+        [np.c_[rim, after, after + above], np.c_[rim, after + above, rim + above]]
+    )
+    faces = np.concatenate([top + above, top[:, ::-1], walls])
+    mesh = trimesh.Trimesh(vertices, faces, process=False)
+    return _manifold(mesh)
+
+
+def _wave(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    return 3.0 * np.sin(x / 9.0) * np.cos(y / 11.0) + 0.02 * x
+
+
+def _rod(diameter: float, low: float, high: float, facets: int) -> Manifold:
+    radius = diameter / 2
+    return Manifold.cylinder(high - low, radius, radius, facets).translate([0, 0, low])
+
+
+def _manifold(mesh: trimesh.Trimesh) -> Manifold:
+    return Manifold(Mesh64(np.asarray(mesh.vertices), np.asarray(mesh.faces, np.uint64)))
+
+
+def _product(name: str, shapes: dict[str, Manifold]) -> Product:
+    parts = {}
+    for part, shape in shapes.items():
+        data = shape.to_mesh64()
+        vertices = np.array(data.vert_properties)[:, :3] * 1e-3
+        mesh = trimesh.Trimesh(vertices, np.array(data.tri_verts, int), process=False)
+        parts[part] = Part(part, mesh, 2700.0 * float(mesh.volume), RigidTransform())
+    return Product(name, parts)
+
+
+if __name__ == "__main__":
+    main()

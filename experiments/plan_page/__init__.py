@@ -1,0 +1,1 @@
+"""``plan.html``: a plan as a page to look at."""

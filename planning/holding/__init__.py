@@ -1,0 +1,1 @@
+"""How well the jig would hold: footprint, imprint, holding force, gripper; the general rule."""

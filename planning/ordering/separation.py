@@ -1,0 +1,110 @@
+"""Proof that no order exists: items that lock each other, alone and in sub-assemblies.
+
+Two facts make it exact without trying orders:
+
+What leaves a set leaves every subset that contains it. So taking off single items until none can be
+taken off ends in the same core whatever was taken first, and if the core has more than one item, no
+order of single items exists: whichever of the core comes last would have to leave the others.
+
+A sub-assembly leaves the rest along j exactly if none of its items hits one of the rest. Draw an
+arrow from each item to those it hits along j: such a sub-assembly exists if and only if the arrows
+do not connect all items in a cycle (the graph is not strongly connected; Wilson and Latombe's
+blocking graph). The graph along -j is that along +j with the arrows reversed: three axes suffice.
+
+Considered are single straight translations along the six directions to infinity: no rotations, no
+paths with turns. Contact is not asked for: it could only forbid more.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.sparse.csgraph import connected_components
+
+from planning.ordering.items import Items, as_set, members
+
+
+@dataclass(frozen=True)
+class Interlock:
+    """Items of which none can be the last to come in.
+
+    Attributes:
+        items: Names of the core: none of them leaves the others along any direction.
+        subassembly: Names of a sub-assembly of the core that leaves the rest of it, or none.
+        direction: Along which it does, or "".
+        stuck: Names of items that no sub-assemblies can build up either; none if all of the product
+            can be built from sub-assemblies.
+    """
+
+    items: tuple[str, ...]
+    subassembly: tuple[str, ...]
+    direction: str
+    stuck: tuple[str, ...]
+
+
+def locked_core(items: Items, kept: int = 0) -> int:
+    """Take off single items until none leaves; return the set that remains.
+
+    Args:
+        items: The items.
+        kept: Set of items that are not taken off.
+    """
+    core = items.everything
+    while True:
+        free = as_set(i for i in members(core & ~kept) if items.leaves(i, core ^ (1 << i)))
+        if not free or core == core & -core:
+            return core
+        core ^= free & -free
+
+
+def find_interlock(items: Items) -> Interlock | None:
+    """Return why no order of single items exists, or None if blocking does not forbid it."""
+    core = locked_core(items)
+    if not core & (core - 1):
+        return None
+    moving, direction = split(items, core)
+    stuck = inseparable(items, core)
+    return Interlock(items.listed(core), items.listed(moving), direction, items.listed(stuck))
+
+
+def split(items: Items, core: int) -> tuple[int, str]:
+    """Return a sub-assembly that leaves the rest of a set, and the direction; 0 if there is none.
+
+    Of several, one that hangs together and whose rest does, and of those the smallest.
+    """
+    choices = []
+    for j, hits in items.hits.items():
+        for part in _closed_parts(core, hits):
+            loose = not (items.connected(part) and items.connected(core ^ part))
+            choices.append((loose, part.bit_count(), part, j))
+    return min(choices)[2:] if choices else (0, "")
+
+
+def _closed_parts(core: int, hits: tuple[int, ...]) -> list[int]:
+    """Return the strongly connected parts of the blocking graph that hit nothing outside."""
+    numbers = list(members(core))
+    graph = np.array([[hits[i] >> k & 1 for k in numbers] for i in numbers])
+    count, labels = connected_components(graph, directed=True, connection="strong")
+    if count == 1:
+        return []
+    parts = [as_set(n for n, own in zip(numbers, labels, strict=True) if own == label)
+             for label in range(count)]  # fmt: skip
+    return [p for p in parts if not any(hits[i] & core & ~p for i in members(p))]
+
+
+def inseparable(items: Items, core: int) -> int:
+    """Split a set, and what comes of it, as far as possible; return the first locked set or 0.
+
+    A part of what can be taken apart can be taken apart: any split will do.
+    """
+    waiting = [core]
+    while waiting:
+        whole = waiting.pop()
+        if not whole & (whole - 1):
+            continue
+        moving, _ = split(items, whole)
+        if not moving:
+            return whole
+        waiting += [moving, whole ^ moving]
+    return 0

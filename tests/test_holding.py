@@ -1,0 +1,262 @@
+"""The general rule: statics with known answers, each reason to reject, and the motor unit."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from tiny_products import bolted, box, peg_in_hole, product_of, rod, tube_and_pins
+
+from cell import CellConfig
+from cell.loading import load_product
+from cell.product import Product
+from cell.soft_jig import JigParameters
+from planning import plan
+from planning.fixing.algorithm import Geometry
+from planning.fixing.directions import DIRECTIONS, unit_vector
+from planning.holding.candidate import Candidate, Choice, Setup
+from planning.holding.capacity import Load, passive_pressure, sideways_capacity, turning_capacity
+from planning.holding.footprint import footprint, posture
+from planning.holding.gravity import Gravity
+from planning.holding.gripper import STROKE, grip_width
+from planning.holding.imprint import Imprint, press, samples_of
+from planning.holding.rule import general_rule
+
+JIG = JigParameters()
+SETUP = Setup.of(CellConfig.load())
+
+
+def geometry_of(product: Product) -> Geometry:
+    geometry = plan(product).geometry
+    assert geometry is not None
+    return geometry
+
+
+def choices(product: Product, order: tuple[str, ...] | None = None) -> tuple[Choice, ...]:
+    return general_rule(product, plan(product, order), SETUP)
+
+
+def candidate(choice: Choice, body: str, up: str) -> Candidate:
+    """The one whose body begins with a part."""
+    return next(c for c in choice.candidates if c.body[0] == body and c.up == up)
+
+
+@pytest.mark.parametrize("up", DIRECTIONS)
+def test_posture_turns_the_axis_up(up):
+    R_JA = posture(up)
+    np.testing.assert_allclose(R_JA @ unit_vector(up), [0, 0, 1])
+    np.testing.assert_allclose(R_JA @ R_JA.T, np.eye(3), atol=1e-15)
+    assert np.linalg.det(R_JA) == pytest.approx(1.0)
+
+
+def test_footprint_of_a_rectangle():
+    """40 x 20 mm: margin, lever, narrowest width and circle by hand."""
+    outline = footprint(np.array([[-0.02, -0.01], [0.02, -0.01], [0.02, 0.01], [-0.02, 0.01]]))
+    assert outline is not None
+    assert outline.margin(np.array([0.015, 0.0])) == pytest.approx(0.005)
+    assert outline.margin(np.array([0.0, 0.013])) == pytest.approx(-0.003)
+    assert outline.lever(np.array([0.005, 0.0]), np.array([1.0, 0.0])) == pytest.approx(0.015)
+    assert outline.narrowest == pytest.approx(0.02)
+    assert outline.circle[1] == pytest.approx(np.hypot(0.04, 0.02))
+    moved = outline.shifted(np.array([0.1, 0.2]))
+    assert moved.margin(np.array([0.115, 0.2])) == pytest.approx(0.005)
+
+
+def test_points_on_a_line_are_no_footprint():
+    assert footprint(np.array([[0.0, 0.0], [1.0, 1.0], [2.0, 2.0], [3.0, 3.0]])) is None
+
+
+def embedded(width: float, depth: float, cell: float = 1e-4) -> Imprint:
+    """A square post in a flat bed, in closed form."""
+    n = round(width / cell)
+    grid = np.full((n + 6, n + 6), np.inf)
+    grid[3:-3, 3:-3] = 0.0
+    half = width / 2
+    corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
+    bed = np.full(grid.shape, depth)
+    bed[3:-3, 3:-3] = 0.0
+    return Imprint(depth, 20.0, 0.0, 0.0, cell, bed, grid, footprint(corners))
+
+
+@pytest.mark.parametrize(("depth", "expected"), [(5e-3, 2.2), (10e-3, 6.6), (15e-3, 13.8)])
+def test_capacity_is_that_of_the_formula(depth, expected):
+    """[D] The formula for a motor 34.8 mm wide, 1.86 N, pushed 40 mm up, by hand."""
+    load = Load(0.0, 1.0, 0.0, np.zeros(2), 0.040)
+    found = sideways_capacity(embedded(34.8e-3, depth), JIG, 1.86, np.zeros(2), load)
+    wall = passive_pressure(JIG) * 34.8e-3 * depth
+    by_hand = min(wall + 0.9 * 1.86, (1.86 * 17.4e-3 + wall * depth / 2) / 0.040)
+    assert found == pytest.approx(by_hand, rel=1e-3)
+    assert found == pytest.approx(expected, abs=0.1)
+
+
+def test_a_low_push_slides_instead_of_tipping():
+    load = Load(0.0, 1.0, 0.0, np.zeros(2), 1e-3)
+    found = sideways_capacity(embedded(34.8e-3, 5e-3), JIG, 1.86, np.zeros(2), load)
+    wall = passive_pressure(JIG) * 34.8e-3 * 5e-3
+    assert found == pytest.approx(wall + 0.9 * 1.86, rel=1e-3)
+
+
+def test_a_load_beside_the_footprint_tips_it():
+    """10 N down at 20 mm beyond the edge overturn what 10 N in the middle steady."""
+    shallow = embedded(34.8e-3, 1e-3)
+    bears = [
+        sideways_capacity(
+            shallow, JIG, 1.86, np.zeros(2), Load(10.0, 1.0, 0.0, np.array([x, 0.0]), 0.04)
+        )
+        for x in (0.0, 37.4e-3)
+    ]
+    assert bears[0] > 4.0 and bears[1] == 0.0
+
+
+def test_passive_pressure_of_the_beads():
+    """[D] 132 kPa for 90 kPa of vacuum and 25 degrees."""
+    assert passive_pressure(JIG) == pytest.approx(132e3, rel=0.005)
+
+
+def test_turning_is_borne_by_friction_of_a_disc():
+    """The torque is mu W 2/3 r, r of the disc of equal area."""
+    post = embedded(34.8e-3, 5e-3)
+    load = Load(10.0, 3.0, 0.5, np.zeros(2), 0.04)
+    expected = 0.9 * 11.86 * 2 / 3 * 34.8e-3 / np.sqrt(np.pi)
+    assert turning_capacity(post, JIG, 1.86, load) == pytest.approx(expected, rel=1e-3)
+
+
+def test_imprint_bears_the_press_force_and_keeps_the_beads():
+    """A flat cylinder like the motor's can under 20 N; its beads go into the collar."""
+    product = product_of({"can": rod(34.8, 0, 50)})
+    geometry = geometry_of(product)
+    imprint = press([samples_of(geometry.solids["can"])], posture("+z"), np.zeros(2), JIG, 20.0)
+    assert 20.0 <= imprint.force < 23.0
+    assert 8e-3 < imprint.depth < 12e-3  # [M] In the twin the arm stops at 8 mm, on the first 20 N.
+    assert imprint.homeless < 0.01 * imprint.volume
+    assert imprint.contact is not None
+    assert imprint.contact.circle[1] == pytest.approx(34.8e-3, abs=2 * imprint.cell)
+    walls = [imprint.walls(np.array(push))[0].sum() for push in ((1, 0), (-1, 0), (0, 1), (0, -1))]
+    assert max(walls) < 1.3 * min(walls)  # Round: the same from all sides, but for the grid.
+
+
+def test_more_force_sinks_deeper():
+    geometry = geometry_of(product_of({"can": rod(34.8, 0, 50)}))
+    can = [samples_of(geometry.solids["can"])]
+    depths = [press(can, posture("+z"), np.zeros(2), JIG, f).depth for f in (5.0, 10.0, 20.0)]
+    assert depths[0] < depths[1] < depths[2]
+
+
+def gravity_of(product: Product) -> tuple[Gravity, Geometry]:
+    geometry = geometry_of(product)
+    return Gravity(product, geometry), geometry
+
+
+def test_loose_pins_fall_when_the_plate_is_turned_over():
+    gravity, _ = gravity_of(tube_and_pins())
+    assert gravity.falling(("plate", "pin_1", "pin_2"), "+z") == []
+    tall = box((60, 30, 10), (-30, -15, 0)) - rod(6, -5, 8, 32)
+    blind = product_of({"plate": tall, "pin": rod(6, -20, 8, 32)})
+    gravity, _ = gravity_of(blind)
+    assert gravity.falling(("plate", "pin"), "-z") == []
+    assert gravity.dropped(("plate", "pin"), "+z") == ["pin"]
+
+
+def test_fastened_parts_do_not_fall():
+    """Bolt and lid hang upside down on their thread; without it both would drop."""
+    product = bolted()
+    gravity, _ = gravity_of(product)
+    assert gravity.dropped(("base", "lid", "bolt"), "-z") == []
+    loose, _ = gravity_of(replace(product, fasteners={}))
+    assert loose.dropped(("base", "lid", "bolt"), "-z") != []
+
+
+def test_pieces_of_a_group_are_carried_one_by_one():
+    gravity, _ = gravity_of(tube_and_pins())
+    assert gravity.components(("pin_1", "pin_2")) == [("pin_1",), ("pin_2",)]
+    assert gravity.dropped(("pin_1", "pin_2"), "-z") == []
+
+
+@pytest.mark.parametrize(("size", "possible"), [((40, 90, 10), True), ((60, 90, 10), False)])
+def test_grip_needs_a_place_narrower_than_the_stroke(size, possible):
+    product = product_of({"bar": box(size, (0, 0, 0))})
+    width, found = grip_width(product, geometry_of(product), ("bar",), posture("+z"))
+    assert width == pytest.approx(min(size[:2]) * 1e-3) and found is possible
+    assert pytest.approx(0.050) == STROKE
+
+
+def test_declared_grasps_decide_and_must_not_come_from_below():
+    motor_unit = load_product("motor_unit")
+    geometry = geometry_of(motor_unit)
+    assert grip_width(motor_unit, geometry, ("plate",), posture("+z")) == (0.07, True)
+    assert grip_width(motor_unit, geometry, ("bolt_1",), posture("-z"))[1] is False
+
+
+@pytest.fixture(scope="module")
+def motor_unit() -> dict[tuple[str, ...], tuple[Choice, ...]]:
+    """Choices for both orders of the paper."""
+    product = load_product("motor_unit")
+    return {order: choices(product, order) for order in product.orders}
+
+
+@pytest.mark.parametrize("number", [0, 1])
+def test_rules_agree_on_the_motor_unit(motor_unit, number):
+    """Found by the rule, not put in: in both orders of the paper, in every step."""
+    for choice in list(motor_unit.values())[number]:
+        assert choice.agrees, choice.verdict
+        assert "Both rules take" in choice.verdict
+
+
+def test_reasons_to_reject_on_the_motor_unit(motor_unit):
+    first, second = motor_unit["motor", "plate", "bolts"]
+    assert "from below" in candidate(first, "motor", "-z").rejected
+    # The shaft sticks out 17 mm under the plate, and the bag stands a little into the hole.
+    inside = re.fullmatch(
+        r"motor would end (\d+) mm inside the frozen bed", candidate(first, "plate", "-z").rejected
+    )
+    assert inside and 16 <= int(inside[1]) <= 23
+    assert "do not hang together" in candidate(second, "bolt_1", "-z").rejected
+    best = second.candidates[0]
+    assert "0.50 N m" in best.notes[0]  # The left hand has to hold it: the base does not.
+
+
+def test_loose_bolts_may_stand_proud(motor_unit):
+    first, _ = motor_unit["plate", "bolts", "motor"]
+    assert first.best is not None and first.best.body == ("plate",)
+    assert any("proud of the seat" in note for note in first.best.notes)
+
+
+def test_rules_disagree_and_say_so():
+    """A flat cap on a tall post with a wide foot: turned over, all is lower.
+
+    Algorithm 1 keeps +z up, as the product says; there is a blind hole, so only +z is open.
+    """
+    post = rod(20, 0, 80)
+    block = box((46, 46, 25), (-23, -23, 60)) - rod(20, 50, 80)
+    choice = choices(product_of({"post": post, "block": block}), ("post", "block"))[0]
+    assert not choice.agrees and choice.best is not None
+    assert choice.best.body == ("block",) and choice.best.up == "-z"
+    assert "The rules disagree" in choice.verdict
+
+
+def test_a_footprint_wider_than_the_bag_is_rejected():
+    table = box((120, 40, 10), (-60, -20, 0))
+    knob = box((10, 10, 20), (-5, -5, 10))
+    choice = choices(product_of({"table": table, "knob": knob}), ("table", "knob"))[0]
+    # The circle around 120 x 40 mm; the bag's aperture is 116.6 mm.
+    assert "needs 126.5 mm, the bag has 116.6 mm" in candidate(choice, "table", "+z").rejected
+
+
+def test_a_body_beside_its_footprint_is_rejected():
+    """A gallows: a thin post under the end of a beam."""
+    post = box((8, 8, 60), (0, 0, 0)) + box((90, 8, 20), (0, 0, 60))
+    cap = box((8, 8, 10), (0, 0, 80))
+    choice = choices(product_of({"post": post, "cap": cap}), ("post", "cap"))[0]
+    reason = candidate(choice, "post", "+z").rejected
+    assert "beside what it stands on" in reason or "base plate" in reason
+
+
+def test_scores_are_shares_and_rank_the_candidates():
+    for choice in choices(peg_in_hole(), ("block", "peg")):
+        scores = [c.score for c in choice.candidates]
+        assert scores == sorted(scores, reverse=True)
+        for one in choice.candidates:
+            assert bool(one.rejected) != bool(one.scores)
+            assert all(0.0 <= score <= 1.0 for score in one.scores.values())

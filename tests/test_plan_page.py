@@ -1,0 +1,187 @@
+"""plan.html: parts where they should be, a page that any browser shows, and what it says."""
+
+from __future__ import annotations
+
+import base64
+import io
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+from matplotlib.image import imread
+from test_report import Outline
+from tiny_products import interlocked_links, peg_in_hole, stack_of_three, tube_and_pins
+
+from cell import CellConfig
+from cell.loading import load_product
+from cell.product import Product
+from cell.soft_jig import BagParameters
+from experiments.plan_command import save_matrices
+from experiments.plan_page import page
+from experiments.plan_page.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
+from experiments.plan_page.heatmaps import contact_map, direction_maps
+from experiments.plan_page.page import write_page
+from experiments.plan_page.scene import projected, view_of
+from experiments.render import rendering_problem
+from planning import plan
+from planning.fixing.directions import DIRECTIONS
+from planning.fixing.remark import bolt_remarks
+from planning.holding.candidate import Setup
+from planning.holding.rule import general_rule
+
+BAG = BagParameters()
+SETUP = Setup.of(CellConfig())
+needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
+
+
+def boxes_overlap(a: trimesh.Trimesh, b: trimesh.Trimesh) -> bool:
+    return bool(np.all(a.bounds[0] < b.bounds[1]) and np.all(b.bounds[0] < a.bounds[1]))
+
+
+def write(product: Product, file: Path, order: tuple[str, ...] | None = None) -> str:
+    fixing = plan(product, order)
+    write_page(file, product, fixing, general_rule(product, fixing, SETUP), SETUP, ["a <note>"])
+    return file.read_text()
+
+
+def test_bag_is_the_cap_of_the_jig():
+    """Height, opening and volume of the drawn bag are those of the parameters."""
+    mesh = bag_mesh(BAG)
+    assert mesh.bounds[1, 2] == pytest.approx(BAG.cap_height)
+    low = mesh.vertices[mesh.vertices[:, 2] < 1e-9]
+    assert np.linalg.norm(low[:, :2], axis=1).max() == pytest.approx(BAG.aperture_radius, rel=1e-3)
+
+
+@pytest.mark.parametrize("up", ["+z", "-z"])
+def test_what_is_fixed_stands_on_the_bag_and_the_rest_comes_from_above(up):
+    """The same step seen upright and with the roles exchanged: the peg below, the block above."""
+    product = replace(peg_in_hole(), up=up)
+    fixing = plan(product, ("block", "peg"))
+    shown = step_arrangement(product, fixing.steps[0], BAG, depth=0.01)
+    parts = {item.name: item.mesh for item in shown if item.name}
+    below, above = ("block", "peg") if up == "+z" else ("peg", "block")
+    assert parts[below].bounds[0, 2] == pytest.approx(BAG.cap_height - 0.01)
+    assert parts[above].bounds[0, 2] > parts[below].bounds[1, 2]
+    (pointer,) = (item.mesh for item in shown if item.color == ARROW)
+    widths = np.ptp(pointer.vertices[pointer.vertices[:, 2] < pointer.bounds[0, 2] + 1e-6], axis=0)
+    assert np.allclose(widths, 0.0, atol=1e-9)  # It ends in its tip, below: it points down.
+
+
+def test_arrow_points_along_its_direction():
+    body = [trimesh.creation.box((0.02, 0.02, 0.02))]
+    for along in np.vstack([np.eye(3), -np.eye(3)]):
+        pointer = arrow(body, along)
+        ahead = pointer.vertices @ along
+        tip = pointer.vertices[ahead > ahead.max() - 1e-9]
+        np.testing.assert_allclose(np.ptp(tip, axis=0), 0.0, atol=1e-9)
+        assert not boxes_overlap(pointer, body[0])
+
+
+@pytest.mark.parametrize("make", [peg_in_hole, stack_of_three, tube_and_pins])
+def test_exploded_parts_are_apart(make):
+    product = make()
+    shown = exploded(product, plan(product).steps)
+    meshes = [item.mesh for item in shown]
+    assert len(meshes) == len(product.parts)
+    assert not any(boxes_overlap(a, b) for k, a in enumerate(meshes) for b in meshes[:k])
+
+
+def test_camera_sees_everything_and_labels_find_it():
+    mesh = trimesh.creation.box((0.1, 0.2, 0.3))
+    view = view_of([mesh])
+    np.testing.assert_allclose(projected(view, np.zeros(3)), [view.width / 2, view.height / 2])
+    pixels = np.array([projected(view, corner) for corner in mesh.vertices])
+    assert np.all(pixels > 0) and np.all(pixels < [view.width, view.height])
+    assert projected(view, np.array([0, 0, 0.1]))[1] < view.height / 2  # Up is up.
+
+
+def blue(png: bytes) -> int:
+    """Count the pixels of the colour of a 1."""
+    rgb = imread(io.BytesIO(png), format="png")[..., :3]
+    return int((np.abs(rgb - np.array([0x3B, 0x6E, 0xA5]) / 255).max(axis=2) < 0.02).sum())
+
+
+def test_heat_maps_show_the_ones():
+    """As many more blue pixels as there are more ones."""
+    names, none, one, two = ("a", "b", "c"), np.zeros((3, 3), int), np.zeros((3, 3), int), None
+    one[0, 1] = 1
+    two = one.copy()
+    two[0, 2] = 1
+    areas = [blue(contact_map(names, matrix)) for matrix in (none, one, two)]
+    assert areas[0] == 0 and areas[2] == pytest.approx(2 * areas[1], rel=0.05)
+    layers = dict.fromkeys(DIRECTIONS, none) | {"+y": one}
+    assert blue(direction_maps(names, layers, "M")) > 100
+
+
+def test_many_parts_fit_into_a_heat_map():
+    names = [f"part_{k}" for k in range(120)]
+    assert blue(contact_map(names, np.triu(np.ones((120, 120), int), 1))) > 1000
+
+
+def test_page_without_rendering_says_so(monkeypatch, tmp_path):
+    monkeypatch.setattr(page, "rendering_problem", lambda: "no libEGL")
+    html = write(tube_and_pins(), tmp_path / "plan.html")
+    outline = Outline(html)
+    assert not outline.open and "No pictures: no libEGL." in outline.text
+    assert "svg" not in outline.seen and outline.seen.count("img") == 3  # The heat maps are there.
+    assert "a <note>" in outline.text and "General rule:" in outline.text
+    assert "feasible" in outline.text and "Exploded view" not in outline.text
+
+
+def test_page_of_an_infeasible_product_shows_the_evidence(monkeypatch, tmp_path):
+    monkeypatch.setattr(page, "rendering_problem", lambda: "no libEGL")
+    text = Outline(write(interlocked_links(), tmp_path / "plan.html")).text
+    assert "infeasible" in text
+    assert "none of link_1, link_2 can leave the others" in text
+    assert "link_2 hits link_1 at (15.00," in text
+
+
+@needs_rendering
+def test_page_holds_a_picture_per_step_and_the_exploded_view(tmp_path):
+    """Self-contained: every picture is inside, in colour, with the names of the parts as text."""
+    product = stack_of_three()
+    html = write(product, tmp_path / "plan.html")
+    outline = Outline(html)
+    assert not outline.open and outline.seen.count("svg") == 3
+    assert not re.search(r'(src|href)="(?!data:)', html)
+    seen = [html.count(f">{name}</text>") for name in product.parts]
+    assert seen == [3, 3, 2]  # plate_2 comes in with the second step.
+    for data in re.findall(r'<image [^>]*href="data:image/png;base64,([^"]+)"', html):
+        rgb = imread(io.BytesIO(base64.b64decode(data)), format="png")
+        assert rgb[..., :3].std() > 0.05
+    assert rendering_problem() is None
+
+
+def test_matrices_as_arrays(tmp_path):
+    fixing = plan(tube_and_pins())
+    save_matrices(fixing, tmp_path / "matrices.npz")
+    with np.load(tmp_path / "matrices.npz", allow_pickle=False) as arrays:
+        assert arrays["parts"].tolist() == list(fixing.parts)
+        assert arrays["directions"].tolist() == list(DIRECTIONS)
+        np.testing.assert_array_equal(arrays["contact"], fixing.contact)
+        for k, j in enumerate(DIRECTIONS):
+            np.testing.assert_array_equal(arrays["free"][k], fixing.free[j])
+            np.testing.assert_array_equal(arrays["reachable"][k], fixing.reachable[j])
+
+
+def foot_on_the_other_side(product: Product) -> Product:
+    """The motor unit with its plate reflected in the middle of its 5 mm face."""
+    plate = product.parts["plate"]
+    vertices = np.array(plate.mesh.vertices) * [1, 1, -1] + [0, 0, 5e-3]
+    mesh = trimesh.Trimesh(vertices, plate.mesh.faces[:, ::-1], process=False)
+    return replace(product, parts={**product.parts, "plate": replace(plate, mesh=mesh)})
+
+
+def test_the_papers_remark_on_bolts_depends_on_the_side_of_the_foot():
+    """Foot on the motor's side: lower on the heads. On the other: lower with bolts on top."""
+    product = load_product("motor_unit")
+    for one, holds in ((product, False), (foot_on_the_other_side(product), True)):
+        geometry = plan(one, ("motor", "plate", "bolts")).geometry
+        assert geometry is not None
+        (remark,) = bolt_remarks(one, geometry)
+        assert (remark.part, remark.bolts, remark.holds) == ("plate", 6, holds)
+        assert ("does not hold" not in remark.text()) == holds
+        print(remark.text())

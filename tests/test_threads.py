@@ -1,0 +1,113 @@
+"""Screw threads from the meshes alone: which overlaps are threads, and where their axis points."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from manifold3d import Manifold
+from tiny_products import bolted, box, product_of, rod, to_trimesh
+
+from cell.errors import CellError
+from cell.product import Product
+from planning import plan
+from planning.fixing.directions import DIRECTIONS
+from planning.fixing.matrices import matrices_of
+from planning.fixing.solids import Solid
+from planning.fixing.threads import find_thread
+
+TOLERANCE = 5e-5
+
+
+def undeclared(thread: float) -> Product:
+    """The bolted lid, without saying that the bolt is one."""
+    return product_of({name: part for name, part in bolted_shapes(thread).items()})
+
+
+def bolted_shapes(thread: float) -> dict[str, Manifold]:
+    base = box((30, 30, 20), (-15, -15, -20)) - rod(thread, -10, 5, 32)
+    lid = box((30, 30, 5), (-15, -15, 0)) - rod(3.4, -5, 10, 32)
+    return {"base": base, "lid": lid, "bolt": rod(3, -5, 6, 64) + rod(5.5, 5, 8, 32)}
+
+
+def solid(shape: Manifold, name: str) -> Solid:
+    mesh = to_trimesh(shape)
+    return Solid(name, np.array(mesh.vertices), np.array(mesh.faces), 1.0, np.zeros(3))
+
+
+@pytest.mark.parametrize("thread", [2.387, 2.5, 2.6])
+def test_a_bolt_in_its_tap_drill_hole_is_a_fastener(thread):
+    """M3 minor diameter, tap drill, and a wider one; nothing says what the parts are."""
+    matrices = matrices_of(undeclared(thread))
+    (found,) = matrices.threads
+    assert (found.bolt, found.nut) == ("bolt", "base")
+    np.testing.assert_allclose(found.axis, [0, 0, 1], atol=1e-9)
+    np.testing.assert_allclose(found.p_AoT, [0, 0, -2.5e-3], atol=1e-6)
+    assert found.diameter == pytest.approx(3e-3, rel=1e-6)
+    assert found.height == pytest.approx((3.0 - thread) / 2 * 1e-3, rel=0.02)
+    assert found.length == pytest.approx(5e-3, rel=1e-6)
+
+
+def test_a_bolt_leaves_along_its_thread_only():
+    matrices = matrices_of(undeclared(2.5))
+    names = list(matrices.solids)
+    bolt, base = names.index("bolt"), names.index("base")
+    free = [j for j in DIRECTIONS if matrices.leaving.free[j][bolt, base]]
+    assert free == ["+z"] and matrices.contact[base, bolt] == 1
+    blocked = {(b.direction) for b in matrices.leaving.blockers if b.moving == "bolt"}
+    assert "+z" not in blocked
+
+
+def test_a_declared_fastener_gives_the_same_plan_as_a_recognised_one():
+    declared, recognised = plan(bolted(2.5)), plan(undeclared(2.5), ("base", "lid", "bolt"))
+    assert declared.feasible and recognised.feasible
+    for j in DIRECTIONS:
+        np.testing.assert_array_equal(declared.free[j], recognised.free[j])
+
+
+@pytest.mark.parametrize("seed", range(5))
+def test_a_thread_is_found_in_any_pose(seed):
+    """Turned and moved at random; the axis turns with it and points to the head."""
+    rng = np.random.default_rng(seed)
+    turn, move = rng.uniform(-180, 180, 3), rng.uniform(-50, 50, 3)
+    shapes = {
+        name: shape.rotate(list(turn)).translate(list(move))
+        for name, shape in bolted_shapes(2.5).items()
+    }
+    found = find_thread(solid(shapes["base"], "base"), solid(shapes["bolt"], "bolt"), TOLERANCE)
+    assert found is not None and (found.bolt, found.nut) == ("bolt", "base")
+    axis = Manifold.cube([1e-3, 1e-3, 1.0], True).rotate(list(turn)).to_mesh64()
+    corners = np.array(axis.vert_properties)[:, :3]
+    along = np.linalg.svd(corners - corners.mean(axis=0))[2][0]
+    assert abs(along @ np.array(found.axis)) == pytest.approx(1.0, abs=1e-4)
+    head = np.array(shapes["bolt"].to_mesh64().vert_properties)[:, :3].mean(axis=0)
+    assert (1e-3 * head - np.array(found.p_AoT)) @ np.array(found.axis) > 0.0
+
+
+def test_a_nut_on_a_bolt_with_a_bore_is_found():
+    """The bolt is a tube itself: what fills the wall inside the thread decides, not the axis."""
+    nut = box((18, 18, 8), (-9, -9, 0)) - rod(8.5, -1, 9, 48)
+    stud = rod(10, -20, 20, 64) - rod(5, -30, 30, 32)
+    found = find_thread(solid(nut, "nut"), solid(stud, "stud"), TOLERANCE)
+    assert found is not None and (found.bolt, found.nut) == ("stud", "nut")
+
+
+@pytest.mark.parametrize(
+    ("hole", "peg"),
+    [
+        (rod(20, -1, 21) - rod(1, -1, 1), rod(10, 0, 30)),  # A peg sunk in solid material.
+        (rod(10, 5, 25, 64), rod(10.24, 5, 35, 64)),  # A press fit: far too shallow for a thread.
+        (rod(6, 5, 25, 64), rod(10, 5, 35, 64)),  # A peg far too thick for its hole.
+    ],
+    ids=["solid", "press fit", "gross"],
+)
+def test_other_overlaps_are_refused_by_name(hole, peg):
+    block = box((40, 40, 20), (-20, -20, 0)) - hole
+    with pytest.raises(CellError, match="'block' and 'peg' overlap by .* mm"):
+        matrices_of(product_of({"block": block, "peg": peg}))
+
+
+def test_a_half_sunk_key_is_no_thread():
+    """A flat layer of overlap, as thin as a thread but not round."""
+    plate, key = box((40, 40, 10), (-20, -20, 0)), box((10, 10, 10), (-5, -5, 9.7))
+    with pytest.raises(CellError, match="'plate' and 'key' overlap"):
+        matrices_of(product_of({"plate": plate, "key": key}))
