@@ -21,8 +21,8 @@ from cell.step_io import STEP_SUFFIXES, load_step
 DEFAULT_DENSITY = 2700.0
 """[kg/m3] [A] aluminium where nothing is said: plans depend on mass ratios only."""
 
-MOST_PARTS = 300
-"""[M] a plan of so many parts takes about a minute; more are a product to be split."""
+MOST_PARTS = 500
+"""[M] C and M_j of 500 parts with 374 000 triangles take 32 s of CPU and 0.6 GB."""
 
 
 def product_names() -> list[str]:
