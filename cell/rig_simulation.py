@@ -189,14 +189,14 @@ class RigSimulation:
 
     def lower(self, speed: float, farthest: float, force: float) -> bool:
         """Lower the hand until it is pushed up with a force [N]; return whether that happened."""
-        start = self.pose
+        start, hanging = self.pose, self._latest[5]  # The part's weight is in the reading.
         for k in range(1, round(farthest / speed / self.time_step) + 1):
             depth = speed * k * self.time_step
             self.pose = HandPose(start.p_WT - [0, 0, depth], start.turn, start.tilt)
             q = self.rig.joints(self.pose)
             self.rig.drive.set_target(self.root, q, np.array([0, 0, -speed, 0, 0]))
             self.step()
-            if self._latest[5] >= force:
+            if self._latest[5] - hanging >= force:
                 self.rig.drive.set_target(self.root, q, np.zeros(5))
                 return True
         return False
