@@ -37,7 +37,8 @@ class Simulation:
         sensor: Where operations learn where parts are.
         log: What happened, every ``simulation.log_period``.
         stepping_cpu: CPU seconds spent stepping so far.
-        tare: By arm name, the wrist's reading (6,) [N m, N] that counts as zero.
+        wrists: By arm name, the latest reading (6,) [N m, N] of the wrist.
+        tare: By arm name, the reading that counts as zero.
     """
 
     def __init__(self, cell: Cell, seed: int = 0) -> None:
@@ -56,11 +57,12 @@ class Simulation:
         )
         self.log = Log()
         self.stepping_cpu = 0.0
-        self.tare = {name: np.zeros(6) for name in cell.wrists}
         self.steps = 0
         self._bed_pushes = False
         cell.reset(self.root)
         self.simulator.Initialize()
+        self.wrists = {name: sensor.read(self.context) for name, sensor in cell.wrists.items()}
+        self.tare = dict(self.wrists)
 
     @property
     def time_step(self) -> float:
@@ -148,7 +150,7 @@ class _PhaseRun:
         period = self.cell.config.simulation.log_period
         self.log_every = max(1, round(period / simulation.time_step))
         if phase.tare:
-            simulation.tare = self._wrenches()
+            simulation.tare = dict(simulation.wrists)
         self.last: Sensed | None = None
         if phase.jaw is not None:
             self.cell.gripper.command(self.root, phase.jaw.opening, phase.jaw.force)
@@ -160,10 +162,6 @@ class _PhaseRun:
                 arm.use_torque_drive()
             elif arm.in_torque_drive():
                 self._hold_here(arm)
-
-    def _wrenches(self) -> dict[str, np.ndarray]:
-        context = self.simulation.context
-        return {name: sensor.read(context) for name, sensor in self.cell.wrists.items()}
 
     def _hold_here(self, arm: Arm) -> None:
         """Back from torque to position drive, with the target where the arm is."""
@@ -196,8 +194,9 @@ class _PhaseRun:
     def sense(self) -> Sensed:
         """Read the sensors after a step, and log if it is time."""
         self.step += 1
-        cell, context = self.cell, self.simulation.context
-        wrench = {name: now - self.simulation.tare[name] for name, now in self._wrenches().items()}
+        cell, context, simulation = self.cell, self.simulation.context, self.simulation
+        simulation.wrists = {name: sensor.read(context) for name, sensor in cell.wrists.items()}
+        wrench = {name: now - simulation.tare[name] for name, now in simulation.wrists.items()}
         for name, value in wrench.items():
             self.peak_force[name] = max(self.peak_force[name], float(np.linalg.norm(value[3:])))
         self.last = Sensed(

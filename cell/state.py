@@ -29,6 +29,8 @@ def save_state(simulation: Simulation) -> State:
         state[f"{name}/target"], state[f"{name}/effort"] = drive.values(root)
     for name, arm in cell.arms.items():
         state[f"{name}/torque_drive"] = np.array(arm.in_torque_drive())
+        # The latest readings, too: Drake derives them from the step that led here.
+        state[f"{name}/wrist"] = simulation.wrists[name].copy()
         state[f"{name}/tare"] = simulation.tare[name].copy()
     for part in cell.parts:
         state[f"asleep/{part.part.name}"] = np.array(part.asleep)
@@ -86,6 +88,7 @@ def restore_state(simulation: Simulation, state: State) -> None:
         if state[f"asleep/{part.part.name}"]:
             part.sleep(root)
     for name, arm in cell.arms.items():
+        simulation.wrists[name] = state[f"{name}/wrist"]
         simulation.tare[name] = state[f"{name}/tare"]
         (arm.use_torque_drive if state[f"{name}/torque_drive"] else arm.use_position_drive)()
     for name, drive in _drives(simulation).items():

@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from solids import assert_same_solid
 
 from cell.cad import motor_unit as mu
 from cell.cad import tray
@@ -177,10 +178,3 @@ def test_committed_models_are_what_the_code_writes(tmp_path: Path) -> None:
         assert (different, errors) == ([], []), 'run "python -m cell.cad" and commit'
         for file in shown:
             assert_same_solid(new / file, kept / file)
-
-
-def assert_same_solid(one: Path, other: Path) -> None:
-    """Which diagonal splits a flat face depends on the processor; the solid does not."""
-    a, b = (trimesh.load_mesh(path, process=True, merge_norm=True) for path in (one, other))
-    np.testing.assert_allclose(a.bounds, b.bounds, atol=1e-8)
-    np.testing.assert_allclose([a.area, a.volume], [b.area, b.volume], rtol=1e-6)

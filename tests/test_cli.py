@@ -98,8 +98,8 @@ def test_quiet_prints_nothing(
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("", "A command is missing. Known: plan, assemble."),
-        ("asemble", "No command 'asemble'. Did you mean 'assemble'? Known: assemble, plan."),
+        ("", "A command is missing. Known: plan, assemble, place, push, regress."),
+        ("asemble", "No command 'asemble'. Did you mean 'assemble'? Known: assemble,"),
         ("plan", "Missing from soft-jig plan: PRODUCT"),
         ("plan a b", "Unrecognized options: b"),
         ("plan a --explan", "Unrecognized options: --explan. Did you mean '--explain'?"),
