@@ -26,7 +26,7 @@ ASSUMED = (
 )
 HAND = (
     "The hand is a closed parallel gripper with fingers and palm of assumed size, pushed so that "
-    "both fingertips' narrow sides lead; its palm overhangs them by 36 mm."
+    "both fingertips' narrow sides lead; its palm overhangs their noses by 36 mm."
 )
 FORMULA = (
     "The displacement is |dp_c|, how far the mean of the four screws moved. The formula printed in "
