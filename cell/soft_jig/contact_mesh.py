@@ -17,7 +17,7 @@ from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import Column, ColumnMesh, TetMesh
 from cell.soft_jig.leaning_bed import LeaningBed
 from cell.soft_jig.parameters import JammedParameters
-from cell.soft_jig.plane_cells import cell_edges, conforming_cells, outline
+from cell.soft_jig.plane_cells import cell_edges, conforming_cells, largest_patch, outline
 from cell.soft_jig.polygons import (
     Facet,
     area,
@@ -73,18 +73,25 @@ def imprint_mesh(
 ) -> TetMesh:
     """Return a mesh of the bed with the imprint of a part.
 
+    A part that leans is meshed in coordinates in which it stands upright (`LeaningBed`), unless it
+    stands on one flat body. Where the contact is in separate patches, only the largest is a floor;
+    the bed's own surface passes over the others.
+
     Args:
         bed: The frozen bed.
         params: Squeeze, ring width and layer depth.
         hulls: Vertices (n, 3) in J of the part's convex hulls that touch the bed.
         lean: (2,) horizontal shift per height of the part's walls; zero for an upright part.
+
+    Raises:
+        BadMesh: The contact has a hole, or the mesh folds over.
     """
     lean = np.zeros(2) if lean is None else lean
     view = LeaningBed(bed)
     undersides = _touching_bodies(view, hulls)
     if not undersides:
         return bed_mesh(bed, params)
-    if _is_flat(undersides) or np.linalg.norm(lean) > MOST_LEAN:
+    if _stands_flat(view, hulls) or np.linalg.norm(lean) > MOST_LEAN:
         return _imprint(view, params, undersides, lean)
     view = LeaningBed(bed, lean, min(map(_lowest, undersides)))
     undersides = _touching_bodies(view, [view.upright(hull) for hull in hulls])
@@ -92,8 +99,16 @@ def imprint_mesh(
     return TetMesh(view.leaning(mesh.vertices), mesh.tetrahedra)
 
 
-def _is_flat(undersides: Sequence[list[Facet]]) -> bool:
-    return len(undersides) == 1 and len(undersides[0]) == 1
+def _stands_flat(bed: LeaningBed, hulls: Sequence[Array]) -> bool:
+    """Say whether the bed touches one body only, over all of its flat underside.
+
+    Then there is nothing beside it to part from, and only the wall leans.
+    """
+    touching = [body for hull in hulls for body in _touching_bodies(bed, [hull])]
+    if len(touching) > 1 or len(touching[0]) > 1:
+        return False
+    touched = sum(area(facet.polygon) for facet in _touching_facets(bed, touching))
+    return touched > 0.99 * area(touching[0][0].polygon)
 
 
 def _imprint(
@@ -101,6 +116,10 @@ def _imprint(
 ) -> TetMesh:
     facets = _touching_facets(bed, undersides)
     plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
+    patch = largest_patch(plane, cells)
+    if len(patch) < len(cells):
+        facets = [facets[k] for k in patch]
+        plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
     loop = outline(cells)
     plane[loop] = offset_loop(plane[loop], params.squeeze)
     tops = [facet.height(plane[cell]) for facet, cell in zip(facets, cells, strict=True)]
@@ -291,7 +310,9 @@ def _with_rings(
     """Surround the floor with a ring of columns at the wall and one out to the aperture."""
     inner, away = plane[loop], _outward(plane[loop])
     # The cap is steep at its edge: end a little inside, with an upright face.
-    to_edge = _distance_to_circle(inner - bed.axis, away, bed.bag.aperture_radius - 2 * bed.bag.cell)
+    to_edge = _distance_to_circle(
+        inner - bed.axis, away, bed.bag.aperture_radius - 2 * bed.bag.cell
+    )
     middle = inner + away * np.minimum(params.ring, to_edge / 2)[:, None]
     outer = inner + away * to_edge[:, None]
     n, count = len(plane), len(loop)
