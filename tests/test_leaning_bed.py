@@ -29,7 +29,7 @@ POSTURES = {
     "plate on its side": (PLATE, [1, 0, 0]),
     "plate foot down": (PLATE, [0, 0, 1]),
 }
-TILTS_DEG = (0.3, 1.0, 3.0, 8.0)
+TILTS_DEG = (0.3, 2.0, 8.0)
 
 
 def leaning(posture: str, tilt_deg: float, seed: int):
@@ -71,10 +71,8 @@ def test_standing_motor_is_meshed_where_it_stands(monkeypatch: pytest.MonkeyPatc
 
 def test_larger_of_two_patches_is_the_floor() -> None:
     """Two separate blocks: the mesh is that of the larger one's floor."""
-    large, small = (
-        box([-0.02, -0.01, 0], [0.005, 0.01, 0.03]),
-        box([0.01, -5e-3, 0], [0.02, 5e-3, 0.03]),
-    )
+    large = box([-0.02, -0.01, 0], [0.005, 0.01, 0.03])
+    small = box([0.01, -0.005, 0], [0.02, 0.005, 0.03])
     bed, hulls = pressed([large, small + [0, 0, 2e-4]], [0, 0, 0])
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
     alone = imprint_mesh(bed, PARAMS.jammed, hulls[:1])

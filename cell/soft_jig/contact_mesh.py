@@ -105,7 +105,7 @@ def _stands_flat(bed: LeaningBed, hulls: Sequence[Array]) -> bool:
     Then there is nothing beside it to part from, and only the wall leans.
     """
     touching = [body for hull in hulls for body in _touching_bodies(bed, [hull])]
-    if len(touching) > 1 or len(touching[0]) > 1:
+    if len(touching) != 1 or len(touching[0]) > 1:
         return False
     touched = sum(area(facet.polygon) for facet in _touching_facets(bed, touching))
     return touched > 0.99 * area(touching[0][0].polygon)
