@@ -15,8 +15,9 @@ from numpy.typing import NDArray
 
 from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import Column, ColumnMesh, TetMesh
+from cell.soft_jig.leaning_bed import LeaningBed
 from cell.soft_jig.parameters import JammedParameters
-from cell.soft_jig.plane_cells import cell_edges, conforming_cells, outline
+from cell.soft_jig.plane_cells import cell_edges, conforming_cells, largest_patch, outline
 from cell.soft_jig.polygons import (
     Facet,
     area,
@@ -47,6 +48,8 @@ OVERHANG = 5e-4
 CRACK = 5e-4
 # Least angle between the directions in which neighbours of the outline look outwards [rad].
 LEAST_TURN = 0.02
+# A part that leans further has no upright axis: its bed is meshed as it stands [m/m].
+MOST_LEAN = 0.2
 # Lower walls than this are left out [m].
 LEAST_WALL = 1e-3
 # Gap between the part and the foot of a wall [m]. With the part's edge inside the floor's columns
@@ -62,7 +65,7 @@ def bed_mesh(bed: Bed, params: JammedParameters) -> TetMesh:
     tops = bed.height_at(circle)
     floor = [_floor_column(loop, circle, tops, float(bed.height_at(np.zeros((1, 2)))[0]), params)]
     roof = np.full((RAYS, 2), np.inf)
-    return _with_rings(bed, params, circle, floor, loop, roof, np.zeros(2))
+    return _with_rings(LeaningBed(bed), params, circle, floor, loop, roof, np.zeros(2))
 
 
 def imprint_mesh(
@@ -70,17 +73,53 @@ def imprint_mesh(
 ) -> TetMesh:
     """Return a mesh of the bed with the imprint of a part.
 
+    A part that leans is meshed in coordinates in which it stands upright (`LeaningBed`), unless it
+    stands on one flat body. Where the contact is in separate patches, only the largest is a floor;
+    the bed's own surface passes over the others.
+
     Args:
         bed: The frozen bed.
         params: Squeeze, ring width and layer depth.
         hulls: Vertices (n, 3) in J of the part's convex hulls that touch the bed.
         lean: (2,) horizontal shift per height of the part's walls; zero for an upright part.
+
+    Raises:
+        BadMesh: The contact has a hole, or the mesh folds over.
     """
-    undersides = _touching_bodies(bed, hulls)
+    lean = np.zeros(2) if lean is None else lean
+    view = LeaningBed(bed)
+    undersides = _touching_bodies(view, hulls)
     if not undersides:
         return bed_mesh(bed, params)
+    if _stands_flat(view, hulls) or np.linalg.norm(lean) > MOST_LEAN:
+        return _imprint(view, params, undersides, lean)
+    view = LeaningBed(bed, lean, min(map(_lowest, undersides)))
+    undersides = _touching_bodies(view, [view.upright(hull) for hull in hulls])
+    mesh = _imprint(view, params, undersides, np.zeros(2))
+    return TetMesh(view.leaning(mesh.vertices), mesh.tetrahedra)
+
+
+def _stands_flat(bed: LeaningBed, hulls: Sequence[Array]) -> bool:
+    """Say whether the bed touches one body only, over all of its flat underside.
+
+    Then there is nothing beside it to part from, and only the wall leans.
+    """
+    touching = [body for hull in hulls for body in _touching_bodies(bed, [hull])]
+    if len(touching) != 1 or len(touching[0]) > 1:
+        return False
+    touched = sum(area(facet.polygon) for facet in _touching_facets(bed, touching))
+    return touched > 0.99 * area(touching[0][0].polygon)
+
+
+def _imprint(
+    bed: LeaningBed, params: JammedParameters, undersides: Sequence[list[Facet]], lean: Array
+) -> TetMesh:
     facets = _touching_facets(bed, undersides)
     plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
+    patch = largest_patch(plane, cells)
+    if len(patch) < len(cells):
+        facets = [facets[k] for k in patch]
+        plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
     loop = outline(cells)
     plane[loop] = offset_loop(plane[loop], params.squeeze)
     tops = [facet.height(plane[cell]) for facet, cell in zip(facets, cells, strict=True)]
@@ -90,7 +129,6 @@ def imprint_mesh(
     ]
     foot = _edge_feet(floor, loop)
     roof = _roof(plane[loop], foot, undersides)
-    lean = np.zeros(2) if lean is None else lean
     return _with_rings(bed, params, plane, floor, loop, roof, lean)
 
 
@@ -126,7 +164,7 @@ def _envelope(undersides: Sequence[list[Facet]], xy: Array) -> Array:
     return lowest
 
 
-def _touching_bodies(bed: Bed, hulls: Sequence[Array]) -> list[list[Facet]]:
+def _touching_bodies(bed: LeaningBed, hulls: Sequence[Array]) -> list[list[Facet]]:
     """Return the undersides of the bodies that reach the bed, lowest first."""
     undersides = sorted(_joined([lower_facets(hull) for hull in hulls]), key=_lowest)
     xy, surface = _surface(bed)
@@ -152,12 +190,12 @@ def _joined(undersides: Sequence[list[Facet]]) -> list[list[Facet]]:
     return joined
 
 
-def _surface(bed: Bed) -> tuple[Array, Array]:
-    xy = np.stack([bed.x[bed.active], bed.y[bed.active]], axis=1).astype(float)
-    return xy, np.asarray(bed.heights[bed.active] + TOUCH)
+def _surface(bed: LeaningBed) -> tuple[Array, Array]:
+    xyz = bed.surface()
+    return xyz[:, :2], xyz[:, 2] + TOUCH
 
 
-def _touching_facets(bed: Bed, undersides: Sequence[list[Facet]]) -> list[Facet]:
+def _touching_facets(bed: LeaningBed, undersides: Sequence[list[Facet]]) -> list[Facet]:
     """Return what the bed touches of the facets; where bodies overlap, of the lower one."""
     xy, surface = _surface(bed)
     touched = _envelope(undersides, xy) < surface
@@ -191,7 +229,7 @@ def _mostly_touches(facet: Facet, underside: list[Facet], xy: Array, surface: Ar
     return bool(over.any() and touching.mean() > 0.5)
 
 
-def _contact_window(bed: Bed, undersides: Sequence[list[Facet]], center: Array) -> Array:
+def _contact_window(bed: LeaningBed, undersides: Sequence[list[Facet]], center: Array) -> Array:
     """Return a convex polygon around the contact.
 
     Where a ray reaches the part's outline before it leaves the bed, the window passes well outside
@@ -261,7 +299,7 @@ def _floor_column(
 
 
 def _with_rings(
-    bed: Bed,
+    bed: LeaningBed,
     params: JammedParameters,
     plane: Array,
     floor: list[Column],
@@ -272,7 +310,9 @@ def _with_rings(
     """Surround the floor with a ring of columns at the wall and one out to the aperture."""
     inner, away = plane[loop], _outward(plane[loop])
     # The cap is steep at its edge: end a little inside, with an upright face.
-    to_edge = _distance_to_circle(inner, away, bed.bag.aperture_radius - 2 * bed.bag.cell)
+    to_edge = _distance_to_circle(
+        inner - bed.axis, away, bed.bag.aperture_radius - 2 * bed.bag.cell
+    )
     middle = inner + away * np.minimum(params.ring, to_edge / 2)[:, None]
     outer = inner + away * to_edge[:, None]
     n, count = len(plane), len(loop)

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from cell.soft_jig.columns import BadMesh
-from cell.soft_jig.polygons import WELD
+from cell.soft_jig.polygons import WELD, area
 
 Array = NDArray[np.float64]
 
@@ -65,6 +65,22 @@ def _split_outercell_edges(
     return full
 
 
+def largest_patch(plane: Array, cells: Sequence[list[int]]) -> list[int]:
+    """Return which cells belong to the largest patch of cells that hang together by whole edges."""
+    owner = {edge: k for k, cell in enumerate(cells) for edge in cell_edges(cell)}
+    patches: list[list[int]] = []
+    left = set(range(len(cells)))
+    while left:
+        patch, waiting = [], [left.pop()]
+        while waiting:
+            patch.append(waiting.pop())
+            beside = {owner.get((b, a), -1) for a, b in cell_edges(cells[patch[-1]])} & left
+            left -= beside
+            waiting += beside
+        patches.append(sorted(patch))
+    return max(patches, key=lambda patch: sum(area(plane[cells[k]]) for k in patch))
+
+
 def outline(cells: Sequence[list[int]]) -> list[int]:
     """Return the counter-clockwise loop of vertices around all cells."""
     edges = {edge for cell in cells for edge in cell_edges(cell)}
@@ -75,5 +91,5 @@ def outline(cells: Sequence[list[int]]) -> list[int]:
         if len(loop) > len(following):
             break
     if len(loop) != len(following):
-        raise BadMesh("The part touches the bed in separate patches; the jig meshes one outline.")
+        raise BadMesh("The part touches the bed around a hole; the jig meshes one outline.")
     return loop
