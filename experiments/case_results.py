@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -37,6 +37,16 @@ FORCES = (
     "The force plate's readings are less those at the start, with the jig at rest on it, and "
     "averaged over 10 ms. While the hand travels from placing to pushing, part and jig sleep: the "
     "last reading then stands for theirs."
+)
+# Of the printed table: quantity, heading, scale.
+PUSH_COLUMNS = (
+    ("displacement_m", "moved [mm]", 1e3),
+    ("push_shear_peak_N", "shear [N]", 1.0),
+    ("force_peaks", "peaks", 1.0),
+)
+PLACE_COLUMNS = (
+    ("depth_m", "depth [mm]", 1e3),
+    ("tilt_rad", "tilt [deg]", float(np.rad2deg(1.0))),
 )
 
 
@@ -104,7 +114,7 @@ def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, 
         "bed": experiment.bed,
         "verdict": verdict(results),
         "cases": [_case(result) for result in results],
-        "displacement": displacement_statistics(results),
+        "by_outcome": _compared(results),
         "real_time_factor": simulated / max(spent, 1e-9),
         "cpu_seconds_per_trial": spent / max(len(trials), 1),
         "config": finite(experiment.config.to_dict()),
@@ -136,26 +146,44 @@ def _case(result: CaseResult) -> dict[str, Any]:
     }
 
 
-def displacement_statistics(results: Sequence[CaseResult]) -> dict[str, Any]:
-    """Return means of successful and failed pushes, 95 % intervals, and Welch's test."""
-    groups = {"success": [], "failure": []}
-    for result in results:
-        for trial in result.trials:
-            if "displacement_m" in trial.measured:
-                outcome = "success" if trial.success else "failure"
-                groups[outcome].append(trial.measured["displacement_m"])
-    found: dict[str, Any] = {}
-    for outcome, values in groups.items():
-        if values:
-            found[outcome] = {"trials": len(values), "mean_m": float(np.mean(values))}
-            found[outcome]["paper_mean_m"] = PAPER_MEANS[outcome]
-        if len(values) > 1:
-            half = student.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values) ** 0.5
-            mean = found[outcome]["mean_m"]
-            found[outcome]["interval_m"] = [mean - float(half), mean + float(half)]
+def _compared(results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return what the paper compares between successes and failures."""
+    return {
+        "displacement_m": by_outcome(results, "displacement_m", PAPER_MEANS),
+        "push_shear_peak_N": by_outcome(results, "push_shear_peak_N"),
+    }
+
+
+def by_outcome(
+    results: Sequence[CaseResult], quantity: str, paper: Mapping[str, float] | None = None
+) -> dict[str, Any]:
+    """Return a quantity's means over successful and failed trials, 95 % intervals, Welch's test.
+
+    Args:
+        results: Of all cases together; the trials of a case are taken as independent.
+        quantity: As it was measured.
+        paper: Its mean by outcome in the paper, if that is known.
+    """
+    groups: dict[str, list[float]] = {"success": [], "failure": []}
+    for trial in (trial for result in results for trial in result.trials):
+        if quantity in trial.measured:
+            groups["success" if trial.success else "failure"].append(trial.measured[quantity])
+    found: dict[str, Any] = {name: _mean(values) for name, values in groups.items() if values}
+    for name in found:
+        found[name] |= {"paper_mean": paper[name]} if paper else {}
     if all(len(values) > 1 and np.ptp(values) > 0 for values in groups.values()):
         test = ttest_ind(groups["success"], groups["failure"], equal_var=False)
         found["welch_p"] = float(np.asarray(test)[1])
+    return found
+
+
+def _mean(values: Sequence[float]) -> dict[str, Any]:
+    """Return number, mean and, for more than one, Student's 95 % interval."""
+    mean = float(np.mean(values))
+    found: dict[str, Any] = {"trials": len(values), "mean": mean}
+    if len(values) > 1:
+        half = student.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values) ** 0.5
+        found["interval"] = [mean - float(half), mean + float(half)]
     return found
 
 
@@ -191,9 +219,8 @@ def case_table(command: str, results: Sequence[CaseResult]) -> Table:
     """Return the table a person reads: outcomes beside the paper's."""
     push = command == "push"
     table = Table(title=f"Experiment: {command}", title_justify="left")
-    quantities = ("displacement_m", "push_shear_peak_N") if push else ("depth_m", "tilt_rad")
-    headings = ("moved [mm]", "shear [N]") if push else ("depth [mm]", "tilt [deg]")
-    scales = (1e3, 1.0) if push else (1e3, float(np.rad2deg(1.0)))
+    columns = PUSH_COLUMNS if push else PLACE_COLUMNS
+    quantities, headings, scales = zip(*columns, strict=True)
     for heading in ("case", "hits", "paper", "agrees", *headings, "CPU [s]"):
         justify = "left" if heading in ("case", "paper") else "right"
         table.add_column(heading, justify=justify, no_wrap=True)

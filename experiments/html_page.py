@@ -69,7 +69,7 @@ def cell(value: Any) -> str:
     if isinstance(value, Mapping):
         return escape(", ".join(str(key) for key, item in value.items() if item)) or "none"
     if isinstance(value, list | tuple):
-        return escape(", ".join(map(str, value)))
+        return escape(", ".join(f"{x:.4g}" if isinstance(x, float) else str(x) for x in value))
     return escape(str(value))
 
 

@@ -17,6 +17,7 @@ PLAN_COLUMNS = ("target", "incoming", "directions", "posture", "fixed_part", "up
 CASE_COLUMNS = (
     "part", "posture", "direction", "meaning", "trials", "successes", "expected", "verdict",
 )  # fmt: skip
+OUTCOME_COLUMNS = ("quantity", "outcome", "trials", "mean", "interval", "paper_mean", "welch_p")
 
 
 def write_report(
@@ -45,6 +46,7 @@ def write_report(
         section("Pictures", figures(pictures)),
         section("Steps", table(result.get("steps", ()), STEP_COLUMNS)),
         section("Cases", table(result.get("cases", ()), CASE_COLUMNS)),
+        section("Successes and failures", table(_outcomes(result), OUTCOME_COLUMNS)),
         section("Measured", _measured(result)),
         section("Plan", _plan(plan)),
         section("Plots", figures(plots)),
@@ -71,6 +73,16 @@ def _measured(result: Mapping[str, Any]) -> str:
         for quantity, value in step.get("measured", {}).items():
             rows.append({"step": name, "quantity": quantity, "value": value})
     return table(rows, ("step", "quantity", "value"))
+
+
+def _outcomes(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Everything compared between successful and failed trials, one line per quantity and group."""
+    return [
+        {"quantity": quantity, "outcome": outcome, **group, "welch_p": groups.get("welch_p")}
+        for quantity, groups in result.get("by_outcome", {}).items()
+        for outcome, group in groups.items()
+        if outcome != "welch_p"
+    ]
 
 
 def _plan(plan: Mapping[str, Any]) -> str:

@@ -3,12 +3,14 @@
 import json
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from cell import CellConfig
-from experiments.case_results import Experiment, displacement_statistics, verdict
+from experiments.case_results import Experiment, by_outcome, verdict
 from experiments.cases import Case, CaseResult, TrialResult
 from experiments.cli import main
+from experiments.metrics.trial import force_peaks
 from experiments.place_push import run_experiment
 from experiments.postures import POSTURES, PUSHES
 from experiments.regress import SUITES, TOLERANCES, drifts
@@ -75,12 +77,15 @@ def test_verdict_is_that_every_case_is_as_expected() -> None:
 
 
 def test_displacements_are_compared_by_outcome() -> None:
-    found = displacement_statistics(
-        [case_with("motor/P1/a", [0.076, 0.078, 0.080]), case_with("motor/P2/a", [0.02, 0.04])]
+    found = by_outcome(
+        [case_with("motor/P1/a", [0.076, 0.078, 0.080]), case_with("motor/P2/a", [0.02, 0.04])],
+        "displacement_m",
+        {"success": 0.0782, "failure": 0.0542},
     )
-    assert found["success"]["mean_m"] == pytest.approx(0.078)
-    assert found["failure"]["mean_m"] == pytest.approx(0.030)
-    low, high = found["success"]["interval_m"]
+    assert found["success"]["mean"] == pytest.approx(0.078)
+    assert found["failure"]["mean"] == pytest.approx(0.030)
+    assert found["failure"]["paper_mean"] == 0.0542
+    low, high = found["success"]["interval"]
     # Student's t for two degrees of freedom: 4.303 * 2 mm / sqrt(3).
     assert (high - low) / 2 == pytest.approx(0.00497, abs=1e-5)
     assert found["welch_p"] < 0.2
@@ -100,3 +105,11 @@ def test_every_tolerance_has_a_reason_and_every_suite_known_cases() -> None:
     labels = {"place": POSTURES, "push": PUSHES}
     for suite in SUITES.values():
         assert all(label is None or label in labels[command] for command, label in suite.cases)
+
+
+def test_a_push_that_the_plate_hardly_feels_is_no_second_peak() -> None:
+    time = np.linspace(0.0, 2.0, 2001)
+    weight, placing = 1.0, 20.0 * np.exp(-(((time - 0.5) / 0.1) ** 2))
+    pushing = np.exp(-(((time - 1.5) / 0.1) ** 2))
+    assert force_peaks(time, weight + placing + 10.0 * pushing, begun=1.0) == 2
+    assert force_peaks(time, weight + placing + 2.0 * pushing, begun=1.0) == 1

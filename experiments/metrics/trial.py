@@ -14,6 +14,7 @@ SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
 UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], read as this tilt [A].
 AT_REST = 1e-3  # [m/s] [A] a part that creeps faster has not come to rest.
 SMOOTHING = 0.01  # [s] A force plate's amplifier smooths over about this long [A].
+VISIBLE = 0.2  # A peak below this share of the placing peak does not stand out in a plot [A].
 
 
 def smoothed(values: np.ndarray, time: np.ndarray) -> np.ndarray:
@@ -81,11 +82,25 @@ def measure_push(trial: Trial) -> Measured:
         "push_normal_peak_N": float(normal[late].max()),
         "push_shear_peak_N": float(shear[late].max()),
         "hand_force_peak_N": float(smoothed(hand, time)[late].max()),
+        "force_peaks": float(force_peaks(time, np.hypot(normal, shear), begun)),
     }
     if trial.placed is not None and trial.moved is not None:
         measured["part_rotation_rad"] = angle_between(trial.placed, trial.moved)
         measured["part_tilt_rad"] = tilt_between(trial.placed, trial.moved)
     return measured
+
+
+def force_peaks(time: np.ndarray, force: np.ndarray, begun: float) -> int:
+    """Return how many peaks a plot of the plate's force shows: that of placing, that of pushing.
+
+    Args:
+        time: (n,) [s].
+        force: (n,) size of the force [N].
+        begun: When the push began [s]; the force just before it is that at rest.
+    """
+    placing, pushing = force[time < begun], force[time >= begun]
+    rest = placing[-1]
+    return 1 + int(pushing.max() - rest >= VISIBLE * (placing.max() - rest))
 
 
 def place_succeeded(trial: Trial, measured: Measured) -> bool:
