@@ -1,0 +1,234 @@
+"""How robust the push outcomes are: to every free parameter, and to how they are computed.
+
+    python -m experiments.push_robustness --samples 20 --workers 2 --out out/robustness
+    python -m experiments.push_robustness --samples 0 --one-by-one
+    python -m experiments.push_robustness --samples 0 --numerics
+
+What the paper does not give is set once, for all cases and both parts, in the configuration's
+section ``push`` and in ``placement`` and ``jig``. One of these numbers follows from a measured one:
+the mean displacement of the paper's successes, 78.2 mm. A jig that follows the hand until it stops
+dead coasts on by v^2 / (2 mu g), so that v = sqrt(2 mu g (78.2 mm - stroke + gap)).
+
+Every variant is one trial of each case with the same disturbance, so that only the variant differs.
+"""
+
+from __future__ import annotations
+
+import multiprocessing
+import sys
+from collections.abc import Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import numpy as np
+import tyro
+from rich.console import Console
+from rich.table import Table
+from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
+
+from cell.config import CellConfig
+from cell.errors import CellError
+from cell.loading import load_product
+from experiments.case_plots import PAPER_MEANS
+from experiments.cases import run_cases
+from experiments.cli import BadUsage, Common
+from experiments.output import output_folder, write_json
+from experiments.place_push import cases_of
+from experiments.results import versions
+
+# Path in the configuration -> its range in the sources, for the table; the cloud is ±10 %.
+PARAMETERS = {
+    "push.jig_mass": "1 to 3 kg [A]",
+    "push.base_friction": "0.3 to 0.6 [A]",
+    "push.speed": "0.22 to 0.28 m/s [D]",
+    "push.acceleration": "any [A]",
+    "push.start_gap": "0.5 to 5 mm [A]",
+    "push.height_fraction": "0.5 to 0.7 [A]",
+    "placement.press_force": "15 to 30 N [A]",
+    "jig.vacuum.pressure": "about 90 kPa [S]",
+    "jig.soil.membrane_modulus": "100 to 150 N/m [R]",
+    "jig.soil.friction_angle": "22 to 28 deg [R]",
+    "jig.jammed.friction": "0.6 to 1.3 [R]",
+    "jig.jammed.pressure_gradient": "1e8 to 1e9 Pa/m [A]",
+    "jig.suction.strength": "0 to 90 kPa [A]",
+}
+SPREAD = 0.10
+AS_CONFIGURED = "as configured"
+GRAVITY = 9.81  # [m/s2]
+NUMERICS = {
+    "half the time step": {"simulation.time_step": 5e-4},
+    "finer bed mesh": {"jig.bag.cell": 0.001, "jig.jammed.edge": 0.008},
+    "approximation similar": {"simulation.contact_approximation": "similar"},
+    "approximation sap": {"simulation.contact_approximation": "sap"},
+}
+Changes = Mapping[str, Any]  # Path in the configuration -> value.
+
+
+@dataclass(frozen=True)
+class Options:
+    """What to run."""
+
+    samples: int = 20
+    """Joint samples, all parameters drawn at once."""
+
+    case: Annotated[str | None, arg(metavar="motor/P2/a")] = None
+    """A case, or a part or posture for all of its cases. Default: all nine."""
+
+    one_by_one: bool = False
+    """Also change every parameter alone, by +10 % and by -10 %."""
+
+    numerics: bool = False
+    """Also halve the time step, refine the bed's mesh, and take other contact approximations."""
+
+    workers: Annotated[int, arg(metavar="CORES")] = 1
+    """Variants at a time."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+
+@dataclass(frozen=True)
+class Variant:
+    """One set of numbers.
+
+    Attributes:
+        name: For the table.
+        changes: What differs from the configuration.
+    """
+
+    name: str
+    changes: Changes = field(default_factory=dict)
+
+
+def value_at(config: CellConfig, path: str) -> float:
+    """Return the number at a dotted path of the configuration."""
+    value = config
+    for name in path.split("."):
+        value = getattr(value, name)
+    return float(value)  # type: ignore[arg-type]
+
+
+def scaled(config: CellConfig, factors: Mapping[str, float]) -> Changes:
+    """Return the numbers of the configuration at some paths, multiplied."""
+    return {path: value_at(config, path) * factor for path, factor in factors.items()}
+
+
+def coasting_speed(config: CellConfig) -> float:
+    """Return the push speed that takes the jig as far as the paper's mean success [m/s]."""
+    push = config.push
+    coast = PAPER_MEANS["success"] - push.stroke + push.start_gap
+    return float(np.sqrt(2 * push.base_friction * GRAVITY * coast))
+
+
+def variants(options: Options, config: CellConfig) -> list[Variant]:
+    """Return what to run: as it is, what else is wanted, and the joint cloud."""
+    rng = np.random.default_rng([options.common.seed, 7])
+    found = [Variant(AS_CONFIGURED)]
+    if options.numerics:
+        found += [Variant(name, changes) for name, changes in NUMERICS.items()]
+    if options.one_by_one:
+        for path in PARAMETERS:
+            for sign in (SPREAD, -SPREAD):
+                found.append(Variant(f"{path} {sign:+.0%}", scaled(config, {path: 1 + sign})))
+    for k in range(options.samples):
+        factors = 1 + rng.uniform(-SPREAD, SPREAD, len(PARAMETERS))
+        changes = scaled(config, dict(zip(PARAMETERS, factors.tolist(), strict=True)))
+        found.append(Variant(f"sample {k}", changes))
+    return found
+
+
+def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
+    """Run one trial of every case with a variant's numbers; return its row."""
+    changes = [f"{path}={value}" for path, value in variant.changes.items()]
+    common = replace(options.common, overrides=(*options.common.overrides, *changes))
+    done = run_cases(
+        cases_of("push", options.case),
+        product=load_product("motor_unit"),
+        config=common.load_config(),
+        bed="soft",
+        trials=1,
+        seed=common.seed,
+    )
+    outcomes = {result.case.label: result for result, _ in done}
+    return {
+        "variant": variant.name,
+        "changes": dict(variant.changes),
+        "outcome": {label: result.outcome for label, result in outcomes.items()},
+        "displacement_m": {
+            label: result.means().get("displacement_m") for label, result in outcomes.items()
+        },
+    }
+
+
+def run_variants(options: Options, config: CellConfig, console: Console) -> list[dict[str, Any]]:
+    """Run every variant, several at a time; print which cases each of them flips."""
+    wanted = variants(options, config)
+    rows: list[dict[str, Any]] = []
+    spawn = multiprocessing.get_context("spawn")
+    with ProcessPoolExecutor(options.workers, spawn) as pool:
+        for row in pool.map(run_variant, [options] * len(wanted), wanted):
+            rows.append(row)
+            flipped = ", ".join(flips(row, rows[0])) or "none"
+            console.print(f"{row['variant']}: flips {flipped}", markup=False)
+    return rows
+
+
+def flips(row: Mapping[str, Any], base: Mapping[str, Any]) -> list[str]:
+    """Return the cases whose outcome differs from the configured one, with their displacement."""
+    return [
+        f"{label} ({1e3 * (row['displacement_m'][label] or 0.0):.0f} mm)"
+        for label, outcome in base["outcome"].items()
+        if row["outcome"][label] != outcome
+    ]
+
+
+def robustness_table(rows: Sequence[Mapping[str, Any]]) -> Table:
+    """Return how often each case keeps its outcome: over the joint samples, over all else."""
+    table = Table(title="Outcomes kept", title_justify="left")
+    for heading in ("case", AS_CONFIGURED, "moved [mm]", "joint samples", "one by one, numerics"):
+        table.add_column(heading)
+    samples = [row for row in rows if row["variant"].startswith("sample")]
+    others = [row for row in rows[1:] if row not in samples]
+    for label, outcome in rows[0]["outcome"].items():
+        kept = [
+            f"{sum(row['outcome'][label] == outcome for row in group)} of {len(group)}"
+            for group in (samples, others)
+        ]
+        moved = 1e3 * (rows[0]["displacement_m"][label] or 0.0)
+        table.add_row(label, outcome, f"{moved:.1f}", *kept)
+    return table
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the script; return the exit code."""
+    options = tyro.cli(Options, args=arguments, description=__doc__, config=(FlagCreatePairsOff,))
+    try:
+        return _run(options)
+    except CellError as error:
+        print(f"push_robustness: {error}", file=sys.stderr)
+        return 2
+
+
+def _run(options: Options) -> int:
+    config = options.common.load_config()
+    if options.samples < 0:
+        raise BadUsage(f"--samples must be at least 0, not {options.samples}.")
+    if options.workers < 1:
+        raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
+    cases_of("push", options.case)
+    console = Console(quiet=options.common.quiet, highlight=False)
+    for path, source in PARAMETERS.items():
+        console.print(f"{path} = {value_at(config, path):g} (range {source})", markup=False)
+    speed = coasting_speed(config)
+    console.print(f"Speed for the paper's 78.2 mm: {speed:.3f} m/s", markup=False)
+    with output_folder(Path(options.common.out)) as out:
+        rows = run_variants(options, config, console)
+        result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
+        write_json(out / "result.json", result | {"versions": versions()})
+    console.print(robustness_table(rows))
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

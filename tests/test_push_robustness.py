@@ -1,0 +1,52 @@
+"""Robustness of the pushes: what is varied exists; the one fitted number follows from its law."""
+
+import pytest
+
+from cell import CellConfig
+from experiments.push_robustness import (
+    NUMERICS,
+    PARAMETERS,
+    SPREAD,
+    Options,
+    coasting_speed,
+    flips,
+    scaled,
+    value_at,
+    variants,
+)
+
+
+def test_configured_speed_is_that_of_the_papers_mean_success() -> None:
+    """Rounded to 0.01 m/s; one of them moves the jig by 0.8 mm."""
+    config = CellConfig()
+    assert config.push.speed == pytest.approx(coasting_speed(config), abs=0.01)
+
+
+def test_samples_stay_within_the_spread_and_repeat() -> None:
+    options, config = Options(samples=3, one_by_one=True, numerics=True), CellConfig()
+    found = variants(options, config)
+    assert found == variants(options, config)
+    assert len(found) == 1 + len(NUMERICS) + 2 * len(PARAMETERS) + 3
+    for variant in found[1 + len(NUMERICS) :]:
+        for path, value in variant.changes.items():
+            assert abs(value / value_at(config, path) - 1) <= SPREAD + 1e-12
+
+
+@pytest.mark.parametrize("path", PARAMETERS)
+def test_every_parameter_is_a_setting_that_can_be_scaled(path: str) -> None:
+    config = CellConfig()
+    changes = scaled(config, {path: 1.1})
+    changed = CellConfig.load("default", changes)
+    assert value_at(changed, path) == pytest.approx(1.1 * value_at(config, path))
+
+
+@pytest.mark.parametrize("name", NUMERICS)
+def test_every_numerical_variant_is_a_valid_configuration(name: str) -> None:
+    assert CellConfig.load("default", NUMERICS[name]) != CellConfig()
+
+
+def test_a_flip_is_an_outcome_that_differs_from_the_configured_one() -> None:
+    base = {"outcome": {"a": "success", "b": "failure"}, "displacement_m": {"a": 0.08, "b": 0.0}}
+    other = {"outcome": {"a": "failure", "b": "failure"}, "displacement_m": {"a": 0.02, "b": 0.0}}
+    assert flips(other, base) == ["a (20 mm)"]
+    assert flips(base, base) == []
