@@ -4,6 +4,7 @@ import pytest
 
 from cell import CellConfig
 from experiments.push_robustness import (
+    CONTROLS,
     NUMERICS,
     PARAMETERS,
     SPREAD,
@@ -40,9 +41,14 @@ def test_every_parameter_is_a_setting_that_can_be_scaled(path: str) -> None:
     assert value_at(changed, path) == pytest.approx(1.1 * value_at(config, path))
 
 
-@pytest.mark.parametrize("name", NUMERICS)
-def test_every_numerical_variant_is_a_valid_configuration(name: str) -> None:
-    assert CellConfig.load("default", NUMERICS[name]) != CellConfig()
+@pytest.mark.parametrize("changes", [*NUMERICS.values(), *CONTROLS.values()], ids=str)
+def test_every_named_variant_is_a_valid_configuration(changes: dict) -> None:
+    assert CellConfig.load("default", changes) != CellConfig()
+
+
+def test_controls_end_with_the_rigid_block() -> None:
+    found = variants(Options(samples=0, controls=True), CellConfig())
+    assert [variant.bed for variant in found] == ["soft"] * (1 + len(CONTROLS)) + ["rigid"]
 
 
 def test_a_flip_is_an_outcome_that_differs_from_the_configured_one() -> None:
