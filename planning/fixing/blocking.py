@@ -97,9 +97,9 @@ def _wide_hits(
         chosen = pairs[first : first + rows]
         owner, d, u = _widest_rectangles(down, up, chosen, tolerance)
         regions = blocked_regions([paired(down, up, d, u)], tolerance)
-        wide = np.flatnonzero(regions.inradius_bounds() >= tolerance)
-        centres = regions.chosen(wide).centres()
-        for (i, k), centre in zip(chosen[owner[wide]], centres, strict=True):
+        centres, radii = regions.discs()
+        wide = np.flatnonzero(radii >= tolerance)
+        for (i, k), centre in zip(chosen[owner[wide]], centres[wide], strict=True):
             hits.setdefault((int(i), int(k)), centre)
     return hits
 
@@ -158,9 +158,9 @@ def _seen_hits(
     seeds: dict[tuple[int, int], np.ndarray] = {}
     first = {parts: pairs.chosen(slice(FIRST)) for parts, pairs in group.items()}
     for parts, regions in _clipped(first, tolerance).items():
-        widest = np.argsort(-regions.widths)[:SEEDS]
-        centres = regions.polygons.chosen(widest[regions.widths[widest] > 0.0]).centres()
-        if len(centres) and regions.widths[widest[0]] >= tolerance:
+        widest = np.argsort(-regions.radii)[:SEEDS]
+        centres = regions.centres[widest[regions.radii[widest] > 0.0]]
+        if len(centres) and regions.radii[widest[0]] >= tolerance:
             hits[parts] = centres[0]
         else:
             seeds[parts] = centres
@@ -179,11 +179,12 @@ def _seen_hits(
 
 @dataclass(frozen=True, eq=False)
 class _Regions:
-    """Blocked regions of one pair of parts with their areas, and bounds on their inradii [m]."""
+    """Blocked regions of one pair of parts with their areas, and a disc in each of them."""
 
     polygons: Polygons
     areas: np.ndarray
-    widths: np.ndarray
+    centres: np.ndarray
+    radii: np.ndarray
 
 
 def _clipped(
@@ -193,11 +194,10 @@ def _clipped(
     if not group:
         return {}
     polygons = blocked_regions(list(group.values()), tolerance)
-    areas, perimeters = polygons.areas_and_perimeters()
-    widths = np.divide(areas, perimeters, out=np.zeros_like(areas), where=perimeters > 0.0)
+    areas, (centres, radii) = polygons.areas(), polygons.discs()
     ends = np.cumsum([len(pairs) for pairs in group.values()])
     return {
-        parts: _Regions(polygons.chosen(own), areas[own], widths[own])
+        parts: _Regions(polygons.chosen(own), areas[own], centres[own], radii[own])
         for parts, own in (
             (parts, slice(end - len(pairs), end))
             for (parts, pairs), end in zip(group.items(), ends, strict=True)
@@ -244,9 +244,9 @@ def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
     for start in range(0, len(pairs), BATCH):
         batch = pairs.chosen(slice(start, start + BATCH))
         regions = _clipped({(0, 1): batch}, tolerance)[0, 1]
-        widest = int(regions.widths.argmax())
-        if regions.widths[widest] >= tolerance:
-            return regions.polygons.chosen(slice(widest, widest + 1)).centres()[0]
+        widest = int(regions.radii.argmax())
+        if regions.radii[widest] >= tolerance:
+            return regions.centres[widest]
         slivers.append(regions)
     return _wide_point(slivers, tolerance)
 

@@ -50,26 +50,39 @@ class Polygons:
         valid = np.arange(self.corners.shape[1]) < self.count[:, None]
         return np.where(valid[:, :, None], self.corners, self.corners[:, :1])
 
-    def inradius_bounds(self) -> np.ndarray:
-        """Return a lower bound on each polygon's inscribed radius, area over perimeter [m]."""
-        areas, perimeters = self.areas_and_perimeters()
-        return np.divide(areas, perimeters, out=np.zeros_like(areas), where=perimeters > 0.0)
+    def areas(self) -> np.ndarray:
+        """Return the area of each polygon, (n,) [m^2]."""
+        x, y = self._from_first()
+        x_next, y_next = _following(x), _following(y)
+        return 0.5 * np.einsum("ij->i", x * y_next - x_next * y)
 
-    def areas_and_perimeters(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return both for each polygon, (n,) [m^2] and (n,) [m]."""
-        corners = self.closed()
-        # From the first corner, to lose no digits far from the origin.
-        x, y = corners[..., 0] - corners[:, :1, 0], corners[..., 1] - corners[:, :1, 1]
-        following = np.r_[1 : x.shape[1], 0]
-        x_next, y_next = x[:, following], y[:, following]
-        areas = 0.5 * np.einsum("ij->i", x * y_next - x_next * y)
-        return areas, np.einsum("ij->i", np.hypot(x_next - x, y_next - y))
+    def discs(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return a disc in each polygon: the largest about its centroid.
 
-    def centres(self) -> np.ndarray:
-        """Return a point (n, 2) inside each polygon that has an area: the mean of its corners."""
-        valid = np.arange(self.corners.shape[1]) < self.count[:, None]
-        total = np.einsum("ijk,ij->ik", self.corners, valid.astype(float))
-        return total / np.maximum(self.count, 1)[:, None]
+        Its radius is a third or more of the polygon's width, and half of it for the strips that
+        facets make.
+
+        Returns:
+            Centres (n, 2) and radii (n,) [m], the latter 0 for a polygon without an area.
+        """
+        x, y = self._from_first()
+        ex, ey = _following(x) - x, _following(y) - y
+        lengths = np.sqrt(ex * ex + ey * ey)
+        turns = x * ey - y * ex
+        total = np.einsum("ij->i", turns)
+        filled = (self.count >= 3) & (total > 0.0)
+        share = turns / np.where(filled, 3.0 * total, 1.0)[:, None]
+        cx = np.einsum("ij,ij->i", 2.0 * x + ex, share)
+        cy = np.einsum("ij,ij->i", 2.0 * y + ey, share)
+        away = ex * (cy[:, None] - y) - ey * (cx[:, None] - x)
+        away = np.divide(away, lengths, out=np.full_like(away, np.inf), where=lengths > 0.0)
+        radii = np.where(filled, np.maximum(away.min(axis=1), 0.0), 0.0)
+        return np.column_stack([cx, cy]) + self.corners[:, 0], radii
+
+    def _from_first(self) -> tuple[np.ndarray, np.ndarray]:
+        """Return coordinates (n, k) from the first corner: none is lost far from the origin."""
+        offsets = self.closed() - self.corners[:, :1]
+        return offsets[..., 0], offsets[..., 1]
 
     def chosen(self, which: np.ndarray | slice) -> Polygons:
         """Return the polygons at the given indices or mask."""
@@ -78,6 +91,11 @@ class Polygons:
     def outlines(self) -> list[np.ndarray]:
         """Return each polygon without its padding."""
         return [corners[:count] for corners, count in zip(self.corners, self.count, strict=True)]
+
+
+def _following(values: np.ndarray) -> np.ndarray:
+    """Return each corner's next value; arrays are (n, k)."""
+    return np.concatenate([values[:, 1:], values[:, :1]], axis=1)
 
 
 def triangle_overlaps(a: np.ndarray, b: np.ndarray) -> Polygons:

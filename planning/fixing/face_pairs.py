@@ -87,7 +87,7 @@ def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
     if not len(d) or not len(u):
         return paired(a, b, d[:0], u[:0])
     boxes = a.low[d, :2], a.high[d, :2], b.low[u, :2], b.high[u, :2]
-    row, column = _all_pairs(*boxes) if len(d) * len(u) <= DENSE else _grid_pairs(*boxes)
+    row, column = box_pairs(*boxes)
     return paired(a, b, d[row], u[column])
 
 
@@ -103,7 +103,7 @@ def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     if not len(d) or not len(u):
         return paired(down, up, d[:0], u[:0])
     boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
-    row, column = _all_pairs(*boxes) if len(d) * len(u) <= DENSE else _grid_pairs(*boxes)
+    row, column = box_pairs(*boxes)
     d, u = d[row], u[column]
     chosen = up.high[u, 2] > down.low[d, 2] + height
     d, u = d[chosen], u[chosen]
@@ -143,10 +143,18 @@ def _near(faces: Faces, others: Faces, height: float) -> np.ndarray:
     return np.flatnonzero(near)
 
 
+def box_pairs(
+    low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of rectangles that overlap, one of (n, 2) with one of (m, 2) each."""
+    search = _all_pairs if len(low_a) * len(low_b) <= DENSE else _grid_pairs
+    return search(low_a, high_a, low_b, high_b)
+
+
 def _all_pairs(
     low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of rectangles that overlap by comparing all (n, 2) with all (m, 2)."""
+    """Find them by comparing all with all."""
     mask = low_a[:, None, 0] < high_b[None, :, 0]
     mask &= high_a[:, None, 0] > low_b[None, :, 0]
     mask &= low_a[:, None, 1] < high_b[None, :, 1]
@@ -158,7 +166,7 @@ def _all_pairs(
 def _grid_pairs(
     low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same as ``_all_pairs`` by sorting the rectangles into the cells of a grid."""
+    """Find them by sorting the rectangles into the cells of a grid."""
     origin = np.maximum(low_a.min(axis=0), low_b.min(axis=0))
     end = np.minimum(high_a.max(axis=0), high_b.max(axis=0))
     low_a, low_b = np.maximum(low_a, origin), np.maximum(low_b, origin)

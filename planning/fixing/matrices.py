@@ -16,7 +16,7 @@ from planning.fixing.directions import DIRECTIONS
 from planning.fixing.interference import Interference, interference
 from planning.fixing.solids import Solid, solids_of
 from planning.fixing.threads import Thread
-from planning.fixing.tolerance import default_tolerance, largest_tolerance
+from planning.fixing.tolerance import PER_CLEARANCE, default_tolerance, largest_tolerance
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,7 +58,7 @@ def matrices_of(
     solids = solids_of(product) if solids is None else solids
     declared = product.contact_tolerance if tolerance is None else tolerance
     parts = list(solids.values())
-    reach = (1.0 + FRAGILE) * (declared or largest_tolerance(parts))
+    reach = max(1.0 + FRAGILE, 1.0 / PER_CLEARANCE) * (declared or largest_tolerance(parts))
     gaps = gap_matrix(parts, reach)
     tolerance = declared or default_tolerance(parts, gaps)
     leaving = interference(parts, tolerance)
