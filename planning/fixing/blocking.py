@@ -11,7 +11,7 @@ free at 0.6 times, is decided with a margin of at least 0.4 times the tolerance 
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -28,6 +28,7 @@ TRIED = 6  # Widest common rectangles of two parts that the second round clips.
 SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
 FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
+GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 48  # Faces of a finely tessellated part that are tried before all of them are.
 SEEDS, NEAR = 4, 4.0  # Widest slivers that are merged with those within so many tolerances.
 
@@ -57,21 +58,35 @@ def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, in
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
     hits = _wide_hits(views, pairs, more)
+    hits |= _seen_hits(dict(_probes(views, pairs, hits, more)), more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
+    held = 0
     for i, k in ((int(i), int(k)) for i, k in pairs):
         if (i, k) in found:
             continue
-        down, up = views[i].down, views[k].up
-        point = _probed(down, up, more)
-        if point is not None:
-            found[i, k] = Decision(point, FRAGILE * tolerance)
-            continue
-        group[i, k] = crossing_faces(down, up, less)
-        if sum(map(len, group.values())) > BATCH:
+        group[i, k] = crossing_faces(views[i].down, views[k].up, less)
+        held += len(group[i, k])
+        if held > GROUP:
             found |= _decided(group, tolerance)
-            group = {}
+            group, held = {}, 0
     return found | _decided(group, tolerance)
+
+
+def _probes(
+    views: Sequence[Envelope],
+    pairs: np.ndarray,
+    known: Mapping[tuple[int, int], np.ndarray],
+    tolerance: float,
+) -> Iterator[tuple[tuple[int, int], FacePairs]]:
+    """Yield a few of the face pairs of finely tessellated parts that are not settled yet."""
+    for i, k in ((int(i), int(k)) for i, k in pairs):
+        down, up = views[i].down, views[k].up
+        if (i, k) not in known and len(down.low) * len(up.low) > DENSE:
+            few = down.chosen(np.linspace(0, len(down.low) - 1, PROBES).astype(int))
+            found = crossing_faces(few, up, tolerance)
+            if len(found):
+                yield (i, k), found
 
 
 def _meeting_boxes(views: Sequence[Envelope], tolerance: float) -> np.ndarray:
@@ -229,15 +244,6 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     return Decision(point, same * abs(step))
 
 
-def _probed(down: Faces, up: Faces, tolerance: float) -> np.ndarray | None:
-    """Return a blocked point (2,) that a few of very many faces show, if they do."""
-    if len(down.low) * len(up.low) <= DENSE:
-        return None
-    few = down.chosen(np.linspace(0, len(down.low) - 1, PROBES).astype(int))
-    pairs = crossing_faces(few, up, tolerance)
-    return _seen_hits({(0, 1): pairs}, tolerance).get((0, 1))
-
-
 def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
     """Return a point (2,) of the plane over which the faces block, if there is one."""
     slivers: list[_Regions] = []
@@ -256,5 +262,4 @@ def _wide_point(slivers: Sequence[_Regions], tolerance: float) -> np.ndarray | N
     if sum(float(regions.areas.sum()) for regions in slivers) < np.pi * tolerance**2:
         return None
     filled = [regions.polygons.chosen(regions.areas > 0.0) for regions in slivers]
-    outlines = [outline for polygons in filled for outline in polygons.outlines()]
-    return point_in_wide_union(outlines, tolerance)
+    return point_in_wide_union(filled, tolerance)

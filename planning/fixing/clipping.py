@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import manifold3d
@@ -28,27 +29,40 @@ class Polygons:
         Args:
             signed: (n, k) value of each polygon's linear function at its corners.
         """
+        kept = self._valid() & (signed >= 0.0)
+        number = np.count_nonzero(kept, axis=1)
+        cut = np.flatnonzero((number > 0) & (number < self.count))
+        count = np.where(number == self.count, self.count, 0)
+        corners = np.concatenate([self.corners, self.corners[:, :1]], axis=1)
+        corners[cut], count[cut] = self.chosen(cut)._cut(signed[cut], kept[cut])
+        return Polygons(corners[:, : max(3, int(count.max(initial=0)))], count)
+
+    def _cut(self, signed: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Return corners (n, k + 1, 2) and their numbers of polygons that the line crosses."""
         n, k = signed.shape
-        row, column = np.arange(n)[:, None], np.arange(k)
-        valid = column < self.count[:, None]
-        following = np.where(column + 1 < self.count[:, None], column + 1, 0)
+        row, following = np.arange(n)[:, None], np.arange(1, k + 1)
+        following = np.where(following < self.count[:, None], following, 0)
         signed_next = signed[row, following]
-        corners_next = self.corners[row, following]
-        kept = valid & (signed >= 0.0)
-        crossed = valid & ((signed >= 0.0) != (signed_next >= 0.0))
+        crossed = self._valid() & ((signed >= 0.0) != (signed_next >= 0.0))
         share = np.divide(signed, signed - signed_next, out=np.zeros_like(signed), where=crossed)
-        crossings = self.corners + share[:, :, None] * (corners_next - self.corners)
-        # Each corner is followed by the crossing on its edge; dropping the unused slots leaves the
+        crossings = self.corners + share[:, :, None] * (self.corners[row, following] - self.corners)
+        # Each corner is followed by the crossing on its edge; without the unused slots that is the
         # clipped outline in order. Clipping a convex polygon adds at most one corner.
-        corners = np.stack([self.corners, crossings], axis=2).reshape(n, 2 * k, 2)
+        outline = np.stack([self.corners, crossings], axis=2).reshape(n, 2 * k, 2)
         used = np.stack([kept, crossed], axis=2).reshape(n, 2 * k)
-        order = np.argsort(~used, axis=1, kind="stable")[:, : k + 1]
-        return Polygons(corners[row, order], used.sum(axis=1))
+        place = np.cumsum(used, axis=1) - 1
+        corners = np.zeros((n, k + 1, 2))
+        at, slot = np.nonzero(used)
+        corners[at, place[at, slot]] = outline[at, slot]
+        return corners, place[:, -1] + 1
+
+    def _valid(self) -> np.ndarray:
+        """Return (n, k) bool: corners that are not padding."""
+        return np.arange(self.corners.shape[1]) < self.count[:, None]
 
     def closed(self) -> np.ndarray:
         """Return the corners with the padding collapsed onto the first one, (n, k, 2)."""
-        valid = np.arange(self.corners.shape[1]) < self.count[:, None]
-        return np.where(valid[:, :, None], self.corners, self.corners[:, :1])
+        return np.where(self._valid()[:, :, None], self.corners, self.corners[:, :1])
 
     def areas(self) -> np.ndarray:
         """Return the area of each polygon, (n,) [m^2]."""
@@ -88,9 +102,12 @@ class Polygons:
         """Return the polygons at the given indices or mask."""
         return Polygons(self.corners[which], self.count[which])
 
-    def outlines(self) -> list[np.ndarray]:
-        """Return each polygon without its padding."""
-        return [corners[:count] for corners, count in zip(self.corners, self.count, strict=True)]
+    def outlines(self, scale: float) -> list[np.ndarray]:
+        """Return each polygon without its padding, its coordinates multiplied by a scale."""
+        counts = self.count.tolist()
+        return [
+            own[:count] for own, count in zip(scale * self.corners, counts, strict=True) if count
+        ]
 
 
 def _following(values: np.ndarray) -> np.ndarray:
@@ -108,11 +125,11 @@ def triangle_overlaps(a: np.ndarray, b: np.ndarray) -> Polygons:
     return polygons
 
 
-def point_in_wide_union(outlines: list[np.ndarray], radius: float) -> np.ndarray | None:
+def point_in_wide_union(several: Sequence[Polygons], radius: float) -> np.ndarray | None:
     """Return a point (2,) of the union that a disc of the radius [m] fits around, if one does."""
     # Clipper rounds to fixed decimals: measuring in radii keeps any size of part away from that.
-    scaled = [outline / radius for outline in outlines]
-    union = manifold3d.CrossSection(scaled, manifold3d.FillRule.NonZero)
+    outlines = [outline for polygons in several for outline in polygons.outlines(1.0 / radius)]
+    union = manifold3d.CrossSection(outlines, manifold3d.FillRule.NonZero)
     # Growing by a thousandth first closes the seams that rounding leaves between neighbours.
     seam = 1e-3
     grown = union.offset(seam, manifold3d.JoinType.Miter)

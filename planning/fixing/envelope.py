@@ -49,16 +49,6 @@ class Faces:
         corners, planes = self.corners[which], self.planes[which]
         return Faces(self.facing, corners, planes, self.low[which], self.high[which])
 
-    def heights_over(self, point: np.ndarray) -> np.ndarray:
-        """Return the heights at which these faces cross the vertical line over (u, v)."""
-        u, v = point
-        near = (self.low[:, 0] <= u) & (self.high[:, 0] >= u)
-        near = np.flatnonzero(near & (self.low[:, 1] <= v) & (self.high[:, 1] >= v))
-        x, y = self.corners[near, :, 0] - u, self.corners[near, :, 1] - v
-        turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
-        inside = near[(turns[:, 0] >= 0.0) & (turns[:, 1] >= 0.0) & (turns[:, 2] >= 0.0)]
-        return self.planes[inside] @ np.array([u, v, 1.0])
-
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
