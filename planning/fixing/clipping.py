@@ -10,6 +10,8 @@ import numpy as np
 
 from planning.fixing.envelope import cross
 
+ROUNDING = 1e-12  # [m] [D] Far above that of float64 (1e-16 of 1 m), far below any tolerance.
+
 
 @dataclass(frozen=True, eq=False)
 class Polygons:
@@ -33,12 +35,16 @@ class Polygons:
         number = np.count_nonzero(kept, axis=1)
         cut = np.flatnonzero((number > 0) & (number < self.count))
         count = np.where(number == self.count, self.count, 0)
-        corners = np.concatenate([self.corners, self.corners[:, :1]], axis=1)
-        corners[cut], count[cut] = self.chosen(cut)._cut(signed[cut], kept[cut])
-        return Polygons(corners[:, : max(3, int(count.max(initial=0)))], count)
+        outlines, count[cut] = self.chosen(cut)._cut(signed[cut], kept[cut])
+        most = max(3, int(count.max(initial=0)))
+        corners = np.zeros((len(count), most, 2))
+        own = min(most, self.corners.shape[1])
+        corners[:, :own] = self.corners[:, :own]
+        corners[cut, : outlines.shape[1]] = outlines
+        return Polygons(corners, count)
 
     def _cut(self, signed: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return corners (n, k + 1, 2) and their numbers of polygons that the line crosses."""
+        """Return corners (n, m, 2) and their numbers (n,) of polygons that the line crosses."""
         n, k = signed.shape
         row, following = np.arange(n)[:, None], np.arange(1, k + 1)
         following = np.where(following < self.count[:, None], following, 0)
@@ -47,14 +53,15 @@ class Polygons:
         share = np.divide(signed, signed - signed_next, out=np.zeros_like(signed), where=crossed)
         crossings = self.corners + share[:, :, None] * (self.corners[row, following] - self.corners)
         # Each corner is followed by the crossing on its edge; without the unused slots that is the
-        # clipped outline in order. Clipping a convex polygon adds at most one corner.
+        # clipped outline in order. It has one corner more at most, unless rounding has made dents
+        # of 1e-18 m into the polygon, as where edges coincide: then a line may cross it four times.
         outline = np.stack([self.corners, crossings], axis=2).reshape(n, 2 * k, 2)
         used = np.stack([kept, crossed], axis=2).reshape(n, 2 * k)
-        place = np.cumsum(used, axis=1) - 1
-        corners = np.zeros((n, k + 1, 2))
+        place, count = np.cumsum(used, axis=1) - 1, np.count_nonzero(used, axis=1)
+        corners = np.zeros((n, int(count.max(initial=0)), 2))
         at, slot = np.nonzero(used)
         corners[at, place[at, slot]] = outline[at, slot]
-        return corners, place[:, -1] + 1
+        return corners, count
 
     def _valid(self) -> np.ndarray:
         """Return (n, k) bool: corners that are not padding."""
@@ -89,8 +96,11 @@ class Polygons:
         cx = np.einsum("ij,ij->i", 2.0 * x + ex, share)
         cy = np.einsum("ij,ij->i", 2.0 * y + ey, share)
         away = ex * (cy[:, None] - y) - ey * (cx[:, None] - x)
-        away = np.divide(away, lengths, out=np.full_like(away, np.inf), where=lengths > 0.0)
-        radii = np.where(filled, np.maximum(away.min(axis=1), 0.0), 0.0)
+        # Edges that rounding has left point anywhere; and no disc is wider than twice the area
+        # by the perimeter, which holds where rounding has left nothing but such edges.
+        away = np.divide(away, lengths, out=np.full_like(away, np.inf), where=lengths > ROUNDING)
+        most = total / np.where(filled, np.einsum("ij->i", lengths), 1.0)
+        radii = np.where(filled, np.clip(away.min(axis=1), 0.0, np.maximum(most, 0.0)), 0.0)
         return np.column_stack([cx, cy]) + self.corners[:, 0], radii
 
     def _from_first(self) -> tuple[np.ndarray, np.ndarray]:
