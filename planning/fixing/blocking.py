@@ -5,8 +5,8 @@ Widest faces, for all pairs of parts at once: two large faces in each other's wa
 blocked pairs. All faces that can hit each other: only regions made of slivers need their union.
 
 A decision flips at some critical tolerance, below which the pair is blocked and above which it is
-free. It is not looked for where it does not matter: a pair blocked at 1.4 times the tolerance, or
-free at 0.6 times, is decided with a margin of at least 0.4 times the tolerance (0.02 mm of 0.05).
+free. It is not looked for where it does not matter: a pair blocked at 1.5 times the tolerance, or
+free at half of it, is decided with a margin of at least half the tolerance (0.025 mm of 0.05).
 """
 
 from __future__ import annotations
@@ -20,8 +20,10 @@ from planning.fixing.clipping import Polygons, point_in_wide_union
 from planning.fixing.envelope import Envelope, Faces
 from planning.fixing.face_pairs import DENSE, FacePairs, blocked_regions, crossing_faces, paired
 
-FRAGILE = 0.4  # [A] Of the tolerance: a decision with less margin than this is worth a remark.
-HALVINGS = 4  # Of the 0.02 mm in which a fragile decision flips: to 1.3 um.
+# Of the tolerance: a decision with less margin than this is worth a remark. [D] Seen edge on, a
+# layer of overlap as thick as the tolerance lets a disc of half the tolerance in, and no larger.
+FRAGILE = 0.5
+HALVINGS = 5  # Of the 0.025 mm in which a fragile decision flips: to 0.8 um.
 
 HEAD = 24  # Widest faces of each part that the second round looks at, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
