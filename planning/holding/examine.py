@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.product import Product
-from cell.soft_jig import SurfaceSamples
 from planning.fixing.algorithm import Geometry
 from planning.fixing.directions import axis_index, unit_vector
 from planning.fixing.solids import combined_cog
@@ -17,7 +16,7 @@ from planning.holding.capacity import PUSHES, Load, sideways_capacity, turning_c
 from planning.holding.footprint import footprint, posture, standing_points
 from planning.holding.gravity import Gravity
 from planning.holding.gripper import STROKE, grip_width
-from planning.holding.imprint import Imprint, depth_in_bed, press, samples_of
+from planning.holding.imprint import Imprint, Surface, depth_in_bed, press, samples_of
 
 GRAVITY = 9.81  # [m/s2]
 FIT_FRICTION = 0.3  # [A] Of metal on metal, dry, 0.2-0.5: how much of an insertion's force a part
@@ -60,7 +59,7 @@ class Examiner:
     def __init__(self, product: Product, geometry: Geometry, setup: Setup) -> None:
         self.product, self.geometry, self.setup = product, geometry, setup
         self.gravity = Gravity(product, geometry)
-        self._samples: dict[str, SurfaceSamples] = {}
+        self._samples: dict[str, Surface] = {}
         self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
 
     def examine(self, trial: Trial) -> Candidate:
@@ -212,7 +211,7 @@ class Examiner:
     def _lowest(self, names: Sequence[str], R_JA: np.ndarray) -> float:
         return min(float((self.geometry.solids[n].vertices @ R_JA[2]).min()) for n in names)
 
-    def _sampled(self, name: str) -> SurfaceSamples:
+    def _sampled(self, name: str) -> Surface:
         if name not in self._samples:
             self._samples[name] = samples_of(self.geometry.solids[name])
         return self._samples[name]
