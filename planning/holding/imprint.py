@@ -23,9 +23,9 @@ from planning.fixing.solids import Solid
 from planning.holding.footprint import Footprint, footprint
 
 CELL = 0.002  # [m] [D] 60 cells across: depths within 1 mm of those on the default 1.5 mm.
-SHORTEST, LONGEST = 0.0002, 0.004  # [m] [D] Steps: the last decides the depth's error.
+SHORTEST, LONGEST = 0.0002, 0.008  # [m] [D] Steps: the last decides the depth's error.
 SHARE = 0.4  # Of the way that the force still asks for, judged by the last step, taken in the next.
-PAST = 1.05  # A step that ends beyond so much of the force is taken back and halved.
+PAST = 1.02  # A step that ends beyond so much of the force is taken back and halved.
 BEARING = 0.0005  # [m] [A] What the bed springs back by: less than that apart bears.
 SPACING = 0.0005  # [m] [D] 16 points per cell, so that hardly any cell under a body gets none.
 NARROW = 0.008  # [m] [A] Beads of 1 mm under a membrane of 1 mm do not rise into such a hole.
@@ -173,9 +173,10 @@ def press(
     points = points[points[:, 2] <= lowest + jig.bag.cap_height]
     bed, apex = _bed(jig), jig.bag.cap_height
     bed.inflate()
+    cap = bed.heights.copy()
     pushed = _Pushed(bed, _joined([under for _, under in seen]), p_middle, apex - lowest)
     depth, borne = pushed.down_to(force, apex - jig.bag.floor)
-    return _read(bed, points + [*(-p_middle), apex - depth - lowest], depth, borne)
+    return _read(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
 
 
 def _joined(parts: list[SurfaceSamples]) -> SurfaceSamples:
@@ -236,9 +237,16 @@ def _bed(jig: JigParameters) -> Bed:
     return Bed(replace(jig.bag, cell=CELL), jig.soil)
 
 
-def _read(bed: Bed, points: np.ndarray, depth: float, borne: float) -> Imprint:
-    """Take over the bed's surface and the body's underside, points (m, 3) in J, over it."""
-    cap = Bed(bed.bag, bed.soil).heights
+def _read(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
+    """Take over the bed's surface and the body's underside over it.
+
+    Args:
+        bed: After the push.
+        cap: (n, n) its surface before [m].
+        points: (m, 3) of the body that look down, in J.
+        depth: Of the lowest point below the apex [m].
+        borne: What the bed bears [N].
+    """
     at = np.rint((points[:, :2] - bed.axis[0]) / CELL).astype(int)
     inside = np.all((at >= 0) & (at < len(bed.axis)), axis=1)
     under = np.full(bed.heights.shape, np.inf)
