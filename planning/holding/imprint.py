@@ -1,16 +1,17 @@
 """How a body sinks into the soft bed, and the imprint it leaves: the cell's own bed model, slowly.
 
 The body is pushed straight down into a freshly inflated bag until the bed bears the press force.
-The posture is kept, as a hand keeps it. The bed is that of the twin on a coarser grid, with longer
-steps: the bed raises its collar and its strength after each, so that the force lags behind by one,
-and the last ones are short. Under 20 N the motor standing on its terminals sinks 16.3 mm, and
-15.8 mm (16.3 mm tilted by 1.7 degrees) in the twin.
+The posture is kept, as a hand keeps it. The bed is that of the twin on the twin's own grid, with
+longer steps: the bed raises its collar and its strength after each, so that the force lags behind
+by one, and the step before each look at the force is short. Under 20 N the motor standing on its
+terminals sinks 15.9 mm; in the twin 16.3 mm, tilted by 1.7 degrees, under the hand on a carriage,
+and 14.4 mm under the arm, which stops at the first 20 N that it feels. [M]
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cache
 
 import numpy as np
@@ -22,12 +23,13 @@ from cell.soft_jig.bed import Bed
 from planning.fixing.solids import Solid
 from planning.holding.footprint import Footprint, footprint
 
-CELL = 0.002  # [m] [D] 60 cells across: depths within 1 mm of those on the default 1.5 mm.
 SHORTEST, LONGEST = 0.0002, 0.008  # [m] [D] Steps: the last decides the depth's error.
 SHARE = 0.4  # Of the way that the force still asks for, judged by the last step, taken in the next.
 PAST = 1.02  # A step that ends beyond so much of the force is taken back and halved.
 BEARING = 0.0005  # [m] [A] What the bed springs back by: less than that apart bears.
-SPACING = 0.0005  # [m] [D] 16 points per cell, so that hardly any cell under a body gets none.
+SPACING = (
+    0.0005  # [m] [D] 9 points per cell of 1.5 mm: hardly any under a body gets none.
+)
 NARROW = 0.008  # [m] [A] Beads of 1 mm under a membrane of 1 mm do not rise into such a hole.
 FEWEST = 500  # Points of a small part.
 SPEED = 0.010  # [m/s] [A] of the hand; the bed hardly depends on it.
@@ -111,21 +113,23 @@ class Surface:
 
     Attributes:
         samples: In the product frame A.
-        below: Per posture the points that look down, turned by it, and one of them per cell.
+        below: Per posture and cell the points that look down, turned, and one of them per cell.
     """
 
     samples: SurfaceSamples
-    below: dict[bytes, tuple[np.ndarray, SurfaceSamples]] = field(default_factory=dict)
+    below: dict[tuple[bytes, float], tuple[np.ndarray, SurfaceSamples]] = field(
+        default_factory=dict
+    )
 
-    def seen_from_below(self, R_JA: np.ndarray) -> tuple[np.ndarray, SurfaceSamples]:
+    def seen_from_below(self, R_JA: np.ndarray, cell: float) -> tuple[np.ndarray, SurfaceSamples]:
         """Return points (m, 3) that look down in a posture, turned, and one of them per cell."""
-        key = R_JA.tobytes()
+        key = R_JA.tobytes(), cell
         if key not in self.below:
             own = self.samples
             down = np.flatnonzero(own.normals @ R_JA[2] < 0.0)
             points, normals = own.points[down] @ R_JA.T, own.normals[down] @ R_JA.T
             turned = SurfaceSamples(own.name, points, normals, own.areas[down], SPACING)
-            self.below[key] = points, _one_per_cell(turned)
+            self.below[key] = points, _one_per_cell(turned, cell)
         return self.below[key]
 
 
@@ -140,11 +144,11 @@ def samples_of(solid: Solid) -> Surface:
     return Surface(SurfaceSamples(solid.name, points, normals, areas, SPACING))
 
 
-def _one_per_cell(samples: SurfaceSamples) -> SurfaceSamples:
+def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
     """Return what a turned surface shows to the bed, as the bed sees it."""
     if not len(samples.points):
         return samples
-    under = samples.underside(np.eye(3), CELL)
+    under = samples.underside(np.eye(3), cell)
     normals = np.column_stack([under.slopes, -np.ones(len(under.slopes))])
     lengths = np.linalg.norm(normals, axis=1)
     normals, areas = normals / lengths[:, None], under.areas * lengths
@@ -167,7 +171,7 @@ def press(
         jig: Bag and beads.
         force: That ends the pressing [N].
     """
-    seen = [part.seen_from_below(R_JA) for part in parts]
+    seen = [part.seen_from_below(R_JA, jig.bag.cell) for part in parts]
     points = np.concatenate([points for points, _ in seen])
     lowest = float(points[:, 2].min())
     points = points[points[:, 2] <= lowest + jig.bag.cap_height]
@@ -234,7 +238,7 @@ class _Pushed:
 @cache
 def _bed(jig: JigParameters) -> Bed:
     """Return one bed for all imprints of a jig: it is inflated anew for each."""
-    return Bed(replace(jig.bag, cell=CELL), jig.soil)
+    return Bed(jig.bag, jig.soil)
 
 
 def _read(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
@@ -247,14 +251,14 @@ def _read(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: fl
         depth: Of the lowest point below the apex [m].
         borne: What the bed bears [N].
     """
-    at = np.rint((points[:, :2] - bed.axis[0]) / CELL).astype(int)
+    low, cell = bed.bag.cap_height - depth, bed.bag.cell
+    at = np.rint((points[:, :2] - bed.axis[0]) / cell).astype(int)
     inside = np.all((at >= 0) & (at < len(bed.axis)), axis=1)
     under = np.full(bed.heights.shape, np.inf)
     np.minimum.at(under, tuple(at[inside].T), points[inside, 2])
-    low = bed.bag.cap_height - depth
     bearing = bed.active & (under < bed.heights + BEARING)
-    volume = float(np.maximum(cap - bed.heights, 0.0).sum()) * CELL**2
+    volume = float(np.maximum(cap - bed.heights, 0.0).sum()) * cell**2
     outline = footprint(np.column_stack([bed.x[bearing], bed.y[bearing]]))
     return Imprint(
-        depth, borne, volume, bed.displaced, CELL, bed.heights - low, under - low, outline
+        depth, borne, volume, bed.displaced, cell, bed.heights - low, under - low, outline
     )
