@@ -27,9 +27,7 @@ SHORTEST, LONGEST = 0.0002, 0.008  # [m] [D] Steps: the last decides the depth's
 SHARE = 0.4  # Of the way that the force still asks for, judged by the last step, taken in the next.
 PAST = 1.02  # A step that ends beyond so much of the force is taken back and halved.
 BEARING = 0.0005  # [m] [A] What the bed springs back by: less than that apart bears.
-SPACING = (
-    0.0005  # [m] [D] 9 points per cell of 1.5 mm: hardly any under a body gets none.
-)
+SPACING = 0.0005  # [m] [D] 9 points per cell of 1.5 mm: hardly any under a body gets none.
 NARROW = 0.008  # [m] [A] Beads of 1 mm under a membrane of 1 mm do not rise into such a hole.
 FEWEST = 500  # Points of a small part.
 SPEED = 0.010  # [m/s] [A] of the hand; the bed hardly depends on it.
