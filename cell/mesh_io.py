@@ -98,9 +98,9 @@ def check_mesh(mesh: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
     if not abs(volume) > 1e-9 * size**3:
         raise BadPart(name, "the mesh encloses no volume")
     if size > LARGEST_PART:
-        raise BadPart(name, f"it is {size:.3g} m long, larger than the cell: wrong units?")
+        raise BadPart(name, f"it is {size:.3g} m long, larger than the cell: wrong units, probably")
     if size < SMALLEST_PART:
-        raise BadPart(name, f"it is only {size * 1e6:.3g} micrometres long: wrong units?")
+        raise BadPart(name, f"it is only {size * 1e6:.3g} micrometres long: wrong units, probably")
     if volume < 0.0:  # A closed surface that faces inwards is common in STL and unambiguous.
         mesh.invert()
     return mesh

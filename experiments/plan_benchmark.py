@@ -1,13 +1,18 @@
 """How long the planner's matrices take: ``python -m experiments.plan_benchmark``.
 
-Five products, CPU seconds after import and without reading files. "Matrices" is all from meshes to
-C, M_j and their margins, with the overlap check; "contact" is the distances' share of it; "again"
-is the same from the cache, content check included. Set OPENBLAS_NUM_THREADS=1 to be strict about
-one core: a few matrix products may use more.
+Products of 5 to 500 parts, CPU seconds after import and without reading files. "Matrices" is all
+from meshes to C, M_j and their margins, with the overlap check; "contact" is the distances' share
+of it; "again" is the same from the cache, content check included. ``--rule`` adds the orders and
+the general rule, ``--profile`` the functions that take longest, ``--large`` the 500 parts with the
+memory they need. Set OPENBLAS_NUM_THREADS=1 to be strict about one core: a few matrix products may
+use more.
 """
 
 from __future__ import annotations
 
+import cProfile
+import pstats
+import resource
 import tempfile
 import time
 from collections.abc import Callable
@@ -15,16 +20,22 @@ from pathlib import Path
 
 import numpy as np
 import trimesh
+import tyro
 from manifold3d import Manifold, Mesh64, OpType
 from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.table import Table
 
+from cell.config import CellConfig
 from cell.loading import load_product
 from cell.product import Part, Product
 from planning.fixing.cache import cached_matrices
 from planning.fixing.contact import gap_matrix
+from planning.fixing.matrices import matrices_of
+from planning.fixing.planner import plan
 from planning.fixing.solids import solids_of
+from planning.holding.candidate import Setup
+from planning.holding.rule import general_rule
 
 STATION = 30.0  # [mm] Pitch of the stations of the bench assemblies.
 
@@ -80,18 +91,56 @@ CASES: dict[str, tuple[Callable[[], Product], float]] = {
 """Product and aim in CPU seconds, by name."""
 
 
-def main() -> None:
-    """Time every case and print the table."""
+LARGE = "bench, 125 stations"
+FUNCTIONS = 15  # That a profile lists.
+
+
+def main(rule: bool = False, profile: bool = False, large: bool = False) -> None:
+    """Time every case and print the table.
+
+    Args:
+        rule: Also time the search for orders and the general rule.
+        profile: Also print where the time goes.
+        large: Only the 500 parts, with the memory that they need.
+    """
+    cases = {LARGE: (lambda: bench(125), 20.0)} if large else CASES
     table = Table(title="CPU seconds of the planner", title_justify="left")
-    for heading in ("product", "parts", "triangles", "contact", "matrices", "aim", "again"):
+    headings = ["product", "parts", "triangles", "contact", "matrices", "aim", "again"]
+    for heading in headings + (["orders", "general rule"] if rule else []):
         table.add_column(heading, justify="left" if heading == "product" else "right")
-    for name, (make, aim) in CASES.items():
+    for name, (make, aim) in cases.items():
         product = make()
         triangles = sum(len(part.mesh.faces) for part in product.parts.values())
         contact, first, again = (f"{seconds:.3f}" for seconds in timed(product))
-        count = len(product.parts)
-        table.add_row(name, str(count), str(triangles), contact, first, f"{aim:g}", again)
+        further = [f"{seconds:.2f}" for seconds in timed_rule(product)] if rule else []
+        count = f"{len(product.parts)}"
+        table.add_row(name, count, f"{triangles}", contact, first, f"{aim:g}", again, *further)
+        if profile:
+            print(f"{name}:")
+            print_profile(product)
     Console().print(table)
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
+    print(f"Largest memory of this process: {most:.0f} MB.")
+
+
+def print_profile(product: Product) -> None:
+    """Print the functions in which a product's matrices spend most time."""
+    profiler = cProfile.Profile()
+    profiler.runcall(matrices_of, product)
+    pstats.Stats(profiler).sort_stats("tottime").print_stats(FUNCTIONS)
+
+
+def timed_rule(product: Product) -> tuple[float, float]:
+    """Return CPU seconds for the search of orders, with matrices at hand, and the general rule."""
+    setup = Setup.of(CellConfig.load())
+    with tempfile.TemporaryDirectory() as folder:
+        cached_matrices(product, None, Path(folder))
+        marks = [time.process_time()]
+        fixing = plan(product, cache=Path(folder))
+    marks.append(time.process_time())
+    general_rule(product, fixing, setup)
+    orders, chosen = np.diff([*marks, time.process_time()])
+    return orders, chosen
 
 
 def timed(product: Product) -> tuple[float, float, float]:
@@ -172,4 +221,4 @@ def _product(name: str, shapes: dict[str, Manifold]) -> Product:
 
 
 if __name__ == "__main__":
-    main()
+    tyro.cli(main)

@@ -5,10 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from manifold3d import Manifold
+from pydrake.math import RigidTransform
 from tiny_products import bolted, box, product_of, rod, to_trimesh
 
 from cell.errors import CellError
-from cell.product import Product
+from cell.product import Part, Product
 from planning import plan
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.matrices import matrices_of
@@ -111,3 +112,58 @@ def test_a_half_sunk_key_is_no_thread():
     plate, key = box((40, 40, 10), (-20, -20, 0)), box((10, 10, 10), (-5, -5, 9.7))
     with pytest.raises(CellError, match="'plate' and 'key' overlap"):
         matrices_of(product_of({"plate": plate, "key": key}))
+
+
+@pytest.mark.parametrize("sink", [0.055, 0.07, 0.095, 0.11])
+@pytest.mark.parametrize("tilt", [0.0, 30.0, 45.0])
+def test_a_layer_thicker_than_the_tolerance_is_refused(sink, tilt):
+    """Up to twice the tolerance it does not block across, but it is an overlap all the same."""
+    plate, cube = box((40, 40, 10), (-20, -20, 0)), box((10, 10, 10), (-5, -5, 10 - sink))
+    shapes = {name: s.rotate([tilt, 0, 0]) for name, s in {"plate": plate, "cube": cube}.items()}
+    with pytest.raises(CellError, match="'plate' and 'cube' overlap"):
+        matrices_of(product_of(shapes), TOLERANCE)
+
+
+@pytest.mark.parametrize("sink", [0.02, 0.045])
+def test_a_thinner_layer_is_a_fit(sink):
+    plate, cube = box((40, 40, 10), (-20, -20, 0)), box((10, 10, 10), (-5, -5, 10 - sink))
+    free = matrices_of(product_of({"plate": plate, "cube": cube}), TOLERANCE).leaving.free
+    assert [j for j in DIRECTIONS if free[j][1, 0]] == ["+x", "-x", "+y", "-y", "+z"]
+
+
+@pytest.mark.parametrize("thread", [2.81, 2.85, 2.87])
+def test_a_fine_thread_of_one_to_two_tolerances_is_a_fastener(thread):
+    """0.065 to 0.095 mm deep on 3 mm: it leaves along its axis, as thread and not as a fit."""
+    matrices = matrices_of(undeclared(thread), TOLERANCE)
+    (found,) = matrices.threads
+    assert (found.bolt, found.nut) == ("bolt", "base")
+    assert [j for j in DIRECTIONS if matrices.leaving.free[j][2, 0]] == ["+z"]
+
+
+@pytest.mark.parametrize(
+    ("facets", "diameter", "places"),
+    [
+        (32, 3.0, [(12.5, 0.0)]),
+        (24, 6.0, [(-12.5, 0.37), (0.0, 0.37), (13.75, 0.37)]),
+        (96, 6.0, [(-13.75, 0.37), (0.0, 0.0), (12.5, 0.37)]),
+        (32, 2.0, [(-12.5, 0.0), (0.0, 0.37), (13.75, 0.37)]),
+    ],
+)
+@pytest.mark.parametrize("overlap", [0.0, 0.5])
+def test_bolts_drawn_on_their_holes_leave(facets, diameter, places, overlap):
+    """Hole and bolt share their corners up to rounding: of holes drawn so, or cut by the bolt.
+
+    Where edges coincide, rounding dents the clipped polygons; a line may cross them four times.
+    """
+    block = box((60, 60, 20), (-30, -30, -20))
+    for x, y in places:
+        block -= rod(diameter - overlap, -5, 5, facets).translate([x, y, 0])
+    mesh = to_trimesh(rod(diameter, -5, 6, facets) + rod(1.8 * diameter, 5, 8, 32))
+    parts = dict(product_of({"block": block}).parts)
+    for k, (x, y) in enumerate(places):
+        X_AP = RigidTransform([1e-3 * x, 1e-3 * y, 0.0])
+        parts[f"bolt_{k}"] = Part(f"bolt_{k}", mesh, 1e-3, X_AP)
+    matrices = matrices_of(Product("tiny", parts), TOLERANCE)
+    assert len(matrices.threads) == (len(places) if overlap else 0)
+    for bolt in range(1, 1 + len(places)):
+        assert [j for j in DIRECTIONS if matrices.leaving.free[j][bolt, 0]] == ["+z"]

@@ -5,13 +5,13 @@ Widest faces, for all pairs of parts at once: two large faces in each other's wa
 blocked pairs. All faces that can hit each other: only regions made of slivers need their union.
 
 A decision flips at some critical tolerance, below which the pair is blocked and above which it is
-free. It is not looked for where it does not matter: a pair blocked at 1.4 times the tolerance, or
-free at 0.6 times, is decided with a margin of at least 0.4 times the tolerance (0.02 mm of 0.05).
+free. It is not looked for where it does not matter: a pair blocked at 1.5 times the tolerance, or
+free at half of it, is decided with a margin of at least half the tolerance (0.025 mm of 0.05).
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,14 +20,17 @@ from planning.fixing.clipping import Polygons, point_in_wide_union
 from planning.fixing.envelope import Envelope, Faces
 from planning.fixing.face_pairs import DENSE, FacePairs, blocked_regions, crossing_faces, paired
 
-FRAGILE = 0.4  # [A] Of the tolerance: a decision with less margin than this is worth a remark.
-HALVINGS = 4  # Of the 0.02 mm in which a fragile decision flips: to 1.3 um.
+# Of the tolerance: a decision with less margin than this is worth a remark. [D] Seen edge on, a
+# layer of overlap as thick as the tolerance lets a disc of half the tolerance in, and no larger.
+FRAGILE = 0.5
+HALVINGS = 5  # Of the 0.025 mm in which a fragile decision flips: to 0.8 um.
 
 HEAD = 24  # Widest faces of each part that the second round looks at, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
 SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
 FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
+GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 48  # Faces of a finely tessellated part that are tried before all of them are.
 SEEDS, NEAR = 4, 4.0  # Widest slivers that are merged with those within so many tolerances.
 
@@ -57,21 +60,35 @@ def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, in
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
     hits = _wide_hits(views, pairs, more)
+    hits |= _seen_hits(dict(_probes(views, pairs, hits, more)), more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
+    held = 0
     for i, k in ((int(i), int(k)) for i, k in pairs):
         if (i, k) in found:
             continue
-        down, up = views[i].down, views[k].up
-        point = _probed(down, up, more)
-        if point is not None:
-            found[i, k] = Decision(point, FRAGILE * tolerance)
-            continue
-        group[i, k] = crossing_faces(down, up, less)
-        if sum(map(len, group.values())) > BATCH:
+        group[i, k] = crossing_faces(views[i].down, views[k].up, less)
+        held += len(group[i, k])
+        if held > GROUP:
             found |= _decided(group, tolerance)
-            group = {}
+            group, held = {}, 0
     return found | _decided(group, tolerance)
+
+
+def _probes(
+    views: Sequence[Envelope],
+    pairs: np.ndarray,
+    known: Mapping[tuple[int, int], np.ndarray],
+    tolerance: float,
+) -> Iterator[tuple[tuple[int, int], FacePairs]]:
+    """Yield a few of the face pairs of finely tessellated parts that are not settled yet."""
+    for i, k in ((int(i), int(k)) for i, k in pairs):
+        down, up = views[i].down, views[k].up
+        if (i, k) not in known and len(down.low) * len(up.low) > DENSE:
+            few = down.chosen(np.linspace(0, len(down.low) - 1, PROBES).astype(int))
+            found = crossing_faces(few, up, tolerance)
+            if len(found):
+                yield (i, k), found
 
 
 def _meeting_boxes(views: Sequence[Envelope], tolerance: float) -> np.ndarray:
@@ -97,9 +114,9 @@ def _wide_hits(
         chosen = pairs[first : first + rows]
         owner, d, u = _widest_rectangles(down, up, chosen, tolerance)
         regions = blocked_regions([paired(down, up, d, u)], tolerance)
-        wide = np.flatnonzero(regions.inradius_bounds() >= tolerance)
-        centres = regions.chosen(wide).centres()
-        for (i, k), centre in zip(chosen[owner[wide]], centres, strict=True):
+        centres, radii = regions.discs()
+        wide = np.flatnonzero(radii >= tolerance)
+        for (i, k), centre in zip(chosen[owner[wide]], centres[wide], strict=True):
             hits.setdefault((int(i), int(k)), centre)
     return hits
 
@@ -158,9 +175,9 @@ def _seen_hits(
     seeds: dict[tuple[int, int], np.ndarray] = {}
     first = {parts: pairs.chosen(slice(FIRST)) for parts, pairs in group.items()}
     for parts, regions in _clipped(first, tolerance).items():
-        widest = np.argsort(-regions.widths)[:SEEDS]
-        centres = regions.polygons.chosen(widest[regions.widths[widest] > 0.0]).centres()
-        if len(centres) and regions.widths[widest[0]] >= tolerance:
+        widest = np.argsort(-regions.radii)[:SEEDS]
+        centres = regions.centres[widest[regions.radii[widest] > 0.0]]
+        if len(centres) and regions.radii[widest[0]] >= tolerance:
             hits[parts] = centres[0]
         else:
             seeds[parts] = centres
@@ -179,11 +196,12 @@ def _seen_hits(
 
 @dataclass(frozen=True, eq=False)
 class _Regions:
-    """Blocked regions of one pair of parts with their areas, and bounds on their inradii [m]."""
+    """Blocked regions of one pair of parts with their areas, and a disc in each of them."""
 
     polygons: Polygons
     areas: np.ndarray
-    widths: np.ndarray
+    centres: np.ndarray
+    radii: np.ndarray
 
 
 def _clipped(
@@ -193,11 +211,10 @@ def _clipped(
     if not group:
         return {}
     polygons = blocked_regions(list(group.values()), tolerance)
-    areas, perimeters = polygons.areas_and_perimeters()
-    widths = np.divide(areas, perimeters, out=np.zeros_like(areas), where=perimeters > 0.0)
+    areas, (centres, radii) = polygons.areas(), polygons.discs()
     ends = np.cumsum([len(pairs) for pairs in group.values()])
     return {
-        parts: _Regions(polygons.chosen(own), areas[own], widths[own])
+        parts: _Regions(polygons.chosen(own), areas[own], centres[own], radii[own])
         for parts, own in (
             (parts, slice(end - len(pairs), end))
             for (parts, pairs), end in zip(group.items(), ends, strict=True)
@@ -229,24 +246,15 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     return Decision(point, same * abs(step))
 
 
-def _probed(down: Faces, up: Faces, tolerance: float) -> np.ndarray | None:
-    """Return a blocked point (2,) that a few of very many faces show, if they do."""
-    if len(down.low) * len(up.low) <= DENSE:
-        return None
-    few = down.chosen(np.linspace(0, len(down.low) - 1, PROBES).astype(int))
-    pairs = crossing_faces(few, up, tolerance)
-    return _seen_hits({(0, 1): pairs}, tolerance).get((0, 1))
-
-
 def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
     """Return a point (2,) of the plane over which the faces block, if there is one."""
     slivers: list[_Regions] = []
     for start in range(0, len(pairs), BATCH):
         batch = pairs.chosen(slice(start, start + BATCH))
         regions = _clipped({(0, 1): batch}, tolerance)[0, 1]
-        widest = int(regions.widths.argmax())
-        if regions.widths[widest] >= tolerance:
-            return regions.polygons.chosen(slice(widest, widest + 1)).centres()[0]
+        widest = int(regions.radii.argmax())
+        if regions.radii[widest] >= tolerance:
+            return regions.centres[widest]
         slivers.append(regions)
     return _wide_point(slivers, tolerance)
 
@@ -256,5 +264,4 @@ def _wide_point(slivers: Sequence[_Regions], tolerance: float) -> np.ndarray | N
     if sum(float(regions.areas.sum()) for regions in slivers) < np.pi * tolerance**2:
         return None
     filled = [regions.polygons.chosen(regions.areas > 0.0) for regions in slivers]
-    outlines = [outline for polygons in filled for outline in polygons.outlines()]
-    return point_in_wide_union(outlines, tolerance)
+    return point_in_wide_union(filled, tolerance)

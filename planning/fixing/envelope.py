@@ -49,16 +49,6 @@ class Faces:
         corners, planes = self.corners[which], self.planes[which]
         return Faces(self.facing, corners, planes, self.low[which], self.high[which])
 
-    def heights_over(self, point: np.ndarray) -> np.ndarray:
-        """Return the heights at which these faces cross the vertical line over (u, v)."""
-        u, v = point
-        near = (self.low[:, 0] <= u) & (self.high[:, 0] >= u)
-        near = np.flatnonzero(near & (self.low[:, 1] <= v) & (self.high[:, 1] >= v))
-        x, y = self.corners[near, :, 0] - u, self.corners[near, :, 1] - v
-        turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
-        inside = near[(turns[:, 0] >= 0.0) & (turns[:, 1] >= 0.0) & (turns[:, 2] >= 0.0)]
-        return self.planes[inside] @ np.array([u, v, 1.0])
-
 
 @dataclass(frozen=True, eq=False)
 class Envelope:
@@ -85,25 +75,23 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 def envelope(solid: Solid, axis: int) -> Envelope:
     """Sort a solid's faces by the side from which they are seen along axis 0, 1 or 2."""
-    triangles = solid.vertices[:, PLANE[axis]][solid.faces]
-    edges = triangles[:, 1:] - triangles[:, :1]
-    normals = np.cross(edges[:, 0], edges[:, 1])
-    lengths = np.linalg.norm(normals, axis=1)
-    slopes = np.divide(normals[:, 2], lengths, out=np.zeros_like(lengths), where=lengths > 0.0)
-    up = _faces(triangles[slopes > WALL_SLOPE], 1)
-    down = _faces(triangles[slopes < -WALL_SLOPE][:, ::-1], -1)
-    corners = solid.vertices[:, PLANE[axis]]
-    return Envelope(solid.name, up, down, corners.min(axis=0), corners.max(axis=0))
+    normals = solid.doubled_areas
+    area2 = normals[:, axis]  # Of the projections, doubled: negative where a face looks down.
+    wall = WALL_SLOPE * np.sqrt(np.einsum("ij,ij->i", normals, normals))
+    up, down = (_faces(solid, axis, np.flatnonzero(f * area2 > wall), f) for f in (1, -1))
+    low, high = solid.lower[list(PLANE[axis])], solid.upper[list(PLANE[axis])]
+    return Envelope(solid.name, up, down, low, high)
 
 
-def _faces(triangles: np.ndarray, facing: int) -> Faces:
-    """Project (m, 3, 3) triangles in (u, v, h), counter-clockwise seen from above."""
-    e1, e2 = triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
-    area2 = cross(e1, e2)
-    order = np.argsort(-area2, kind="stable")
-    triangles, e1, e2, area2 = triangles[order], e1[order], e2[order], area2[order]
-    g = (e1[:, 2] * e2[:, 1] - e2[:, 2] * e1[:, 1]) / area2
-    k = (e1[:, 0] * e2[:, 2] - e2[:, 0] * e1[:, 2]) / area2
-    c = triangles[:, 0, 2] - g * triangles[:, 0, 0] - k * triangles[:, 0, 1]
+def _faces(solid: Solid, axis: int, chosen: np.ndarray, facing: int) -> Faces:
+    """Project the chosen faces along the axis; those that look down are turned over."""
+    normals, (low, high) = solid.doubled_areas, solid.face_boxes
+    chosen = chosen[np.argsort(-facing * normals[chosen, axis], kind="stable")]
+    u, v, h = PLANE[axis]
+    corners = solid.triangles[chosen][:, ::facing]
+    across = normals[chosen]
+    g, k = -across[:, u] / across[:, h], -across[:, v] / across[:, h]
+    c = corners[:, 0, h] - g * corners[:, 0, u] - k * corners[:, 0, v]
+    seen = list(PLANE[axis])
     planes = np.stack([g, k, c], axis=1)
-    return Faces(facing, triangles[:, :, :2], planes, triangles.min(axis=1), triangles.max(axis=1))
+    return Faces(facing, corners[:, :, [u, v]], planes, low[chosen][:, seen], high[chosen][:, seen])

@@ -1,6 +1,6 @@
 """What the matrices rest on, for the reader of a plan: tolerance, threads, margins, remarks.
 
-A decision is fragile if another tolerance, nearer than ``FRAGILE`` of it (0.02 mm of the usual
+A decision is fragile if another tolerance, nearer than ``FRAGILE`` of it (0.025 mm of the usual
 0.05), would turn it over. The plan hangs on it if A(P_t, P_i) of some step would then differ.
 """
 

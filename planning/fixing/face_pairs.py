@@ -17,6 +17,8 @@ from planning.fixing.clipping import Polygons, triangle_overlaps
 from planning.fixing.envelope import Faces
 
 DENSE = 400_000  # Up to so many pairs, comparing all with all is faster than a grid.
+ON_EDGE = 1e-12  # [m] A point on the edge of a face's box is in it.
+FIRST_ROW, FIRST_COLUMN = 1, 2
 CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
 
 
@@ -66,6 +68,20 @@ def blocked_regions(several: Sequence[FacePairs], height: float) -> Polygons:
     return regions.clipped((regions.corners * slope).sum(axis=2) + offset[:, None])
 
 
+def heights_over(faces: Faces, points: np.ndarray) -> list[np.ndarray]:
+    """Return the heights at which faces cross the vertical line over each point (q, 2)."""
+    low, high = faces.low[:, :2], faces.high[:, :2]
+    point, face = box_pairs(points - ON_EDGE, points + ON_EDGE, low, high)
+    at = points[point]
+    x, y = (faces.corners[face, :, k] - at[:, k, None] for k in (0, 1))
+    turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
+    inside = (turns[:, 0] >= 0.0) & (turns[:, 1] >= 0.0) & (turns[:, 2] >= 0.0)
+    point, planes = point[inside], faces.planes[face[inside]]
+    heights = planes[:, 0] * at[inside, 0] + planes[:, 1] * at[inside, 1] + planes[:, 2]
+    order = np.argsort(point, kind="stable")
+    return np.split(heights[order], np.searchsorted(point[order], np.arange(1, len(points))))
+
+
 def paired(down: Faces, up: Faces, d: np.ndarray, u: np.ndarray) -> FacePairs:
     """Return the pairs of down-faces d with up-faces u, given by their indices."""
     low = np.maximum(down.low[d, :2], up.low[u, :2])
@@ -87,7 +103,7 @@ def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
     if not len(d) or not len(u):
         return paired(a, b, d[:0], u[:0])
     boxes = a.low[d, :2], a.high[d, :2], b.low[u, :2], b.high[u, :2]
-    row, column = _all_pairs(*boxes) if len(d) * len(u) <= DENSE else _grid_pairs(*boxes)
+    row, column = box_pairs(*boxes)
     return paired(a, b, d[row], u[column])
 
 
@@ -103,7 +119,7 @@ def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     if not len(d) or not len(u):
         return paired(down, up, d[:0], u[:0])
     boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
-    row, column = _all_pairs(*boxes) if len(d) * len(u) <= DENSE else _grid_pairs(*boxes)
+    row, column = box_pairs(*boxes)
     d, u = d[row], u[column]
     chosen = up.high[u, 2] > down.low[d, 2] + height
     d, u = d[chosen], u[chosen]
@@ -143,10 +159,18 @@ def _near(faces: Faces, others: Faces, height: float) -> np.ndarray:
     return np.flatnonzero(near)
 
 
+def box_pairs(
+    low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of rectangles that overlap, one of (n, 2) with one of (m, 2) each."""
+    search = _all_pairs if len(low_a) * len(low_b) <= DENSE else _grid_pairs
+    return search(low_a, high_a, low_b, high_b)
+
+
 def _all_pairs(
     low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the indices of rectangles that overlap by comparing all (n, 2) with all (m, 2)."""
+    """Find them by comparing all with all."""
     mask = low_a[:, None, 0] < high_b[None, :, 0]
     mask &= high_a[:, None, 0] > low_b[None, :, 0]
     mask &= low_a[:, None, 1] < high_b[None, :, 1]
@@ -158,28 +182,33 @@ def _all_pairs(
 def _grid_pairs(
     low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Return the same as ``_all_pairs`` by sorting the rectangles into the cells of a grid."""
+    """Find them by sorting the rectangles into the cells of a grid over what both sides cover."""
     origin = np.maximum(low_a.min(axis=0), low_b.min(axis=0))
     end = np.minimum(high_a.max(axis=0), high_b.max(axis=0))
+    in_a, in_b = (
+        np.flatnonzero(((low < end) & (high > origin)).all(axis=1))
+        for low, high in ((low_a, high_a), (low_b, high_b))
+    )
+    if not len(in_a) or not len(in_b):
+        return in_a[:0], in_b[:0]
+    low_a, high_a, low_b, high_b = low_a[in_a], high_a[in_a], low_b[in_b], high_b[in_b]
     low_a, low_b = np.maximum(low_a, origin), np.maximum(low_b, origin)
     high_a, high_b = np.minimum(high_a, end), np.minimum(high_b, end)
     cell = _cell_size(low_a, high_a, low_b, high_b)
     columns = int((end[1] - origin[1]) / cell) + 1
-    face_a, cell_a = _cells_of((low_a - origin) / cell, (high_a - origin) / cell, columns)
-    face_b, cell_b = _cells_of((low_b - origin) / cell, (high_b - origin) / cell, columns)
+    face_a, cell_a, first_a = _cells_of((low_a - origin) / cell, (high_a - origin) / cell, columns)
+    face_b, cell_b, first_b = _cells_of((low_b - origin) / cell, (high_b - origin) / cell, columns)
     order = np.argsort(cell_b, kind="stable")
-    face_b, cell_b = face_b[order], cell_b[order]
-    first, last = (np.searchsorted(cell_b, cell_a, side) for side in ("left", "right"))
-    count = last - first
-    a = np.repeat(face_a, count)
-    b = face_b[np.repeat(first, count) + _ranges(count)]
-    corner = np.maximum(low_a[a], low_b[b])
-    size = np.minimum(high_a[a], high_b[b]) - corner
-    # A pair meets in each cell that both lie in; the one with the overlap's lower corner keeps it.
-    place = ((corner - origin) / cell).astype(int)
-    own = place[:, 0] * columns + place[:, 1] == np.repeat(cell_a, count)
-    own &= (size > 0.0).all(axis=1)
-    return a[own], b[own]
+    face_b, cell_b, first_b = face_b[order], cell_b[order], first_b[order]
+    start, stop = (np.searchsorted(cell_b, cell_a, side) for side in ("left", "right"))
+    count = stop - start
+    at_b = np.repeat(start, count) + _ranges(count)
+    # A pair meets in each cell that both lie in; the first of them, in row and column, keeps it.
+    own = np.flatnonzero((np.repeat(first_a, count) | first_b[at_b]) == (FIRST_ROW | FIRST_COLUMN))
+    a, b = np.repeat(face_a, count)[own], face_b[at_b[own]]
+    meet = (low_a[a] < high_b[b]) & (high_a[a] > low_b[b])
+    meet = np.flatnonzero(meet[:, 0] & meet[:, 1])
+    return in_a[a[meet]], in_b[b[meet]]
 
 
 def _cell_size(*corners: np.ndarray) -> float:
@@ -192,15 +221,21 @@ def _cell_size(*corners: np.ndarray) -> float:
     return cell
 
 
-def _cells_of(low: np.ndarray, high: np.ndarray, columns: int) -> tuple[np.ndarray, np.ndarray]:
-    """Return a face index and a cell number for each cell that each rectangle reaches into."""
+def _cells_of(
+    low: np.ndarray, high: np.ndarray, columns: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a face index and a cell number for each cell that each rectangle reaches into.
+
+    And whether that cell is in the first row and the first column of those of the rectangle, as
+    ``FIRST_ROW`` and ``FIRST_COLUMN``, or-ed.
+    """
     first, last = low.astype(int), high.astype(int)
     span = last - first + 1
-    count = np.prod(span, axis=1)
+    count = span[:, 0] * span[:, 1]
     face = np.repeat(np.arange(len(low)), count)
-    step = _ranges(count)
-    row = first[face, 0] + step // span[face, 1]
-    return face, row * columns + first[face, 1] + step % span[face, 1]
+    row, column = np.divmod(_ranges(count), span[face, 1])
+    edge = np.where(row == 0, FIRST_ROW, 0) | np.where(column == 0, FIRST_COLUMN, 0)
+    return face, (first[face, 0] + row) * columns + first[face, 1] + column, edge
 
 
 def _ranges(count: np.ndarray) -> np.ndarray:

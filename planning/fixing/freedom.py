@@ -108,7 +108,7 @@ def travel_along(moving: Envelope, staying: Envelope, tolerance: float) -> float
     regions = triangle_overlaps(moving.up.corners[pairs.d], staying.down.corners[pairs.u])
     gap = staying.down.planes[pairs.u] - moving.up.planes[pairs.d]
     heights = (regions.closed() * gap[:, None, :2]).sum(axis=2) + gap[:, 2:]
-    wide = (regions.count >= 3) & (regions.inradius_bounds() > tolerance / 4.0)
+    wide = (regions.count >= 3) & (regions.discs()[1] > tolerance / 4.0)
     ahead = heights[wide & (heights.max(axis=1) > -tolerance)]
     return max(0.0, float(ahead.min())) if len(ahead) else 0.0
 

@@ -13,14 +13,15 @@ two surfaces cross by their sagitta.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from planning.fixing.blocking import FRAGILE, decisions
+from planning.fixing.blocking import FRAGILE, Decision, decisions
 from planning.fixing.directions import DIRECTIONS, axis_index, opposite, unit_vector
-from planning.fixing.envelope import PLANE, Envelope, envelope
+from planning.fixing.envelope import PLANE, Envelope, Faces, envelope
+from planning.fixing.face_pairs import heights_over
 from planning.fixing.solids import Solid
 
 # [m] [A] Above the sagitta r (1 - cos(pi / n)) of usual facets (7 um for r 6 mm, n 64) and the
@@ -81,12 +82,13 @@ def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> I
     blockers = []
     for forward in ("+x", "+y", "+z"):
         views = [envelope(solid, axis_index(forward)) for solid in solids]
-        for (i, k), decision in decisions(views, tolerance).items():
+        decided = decisions(views, tolerance)
+        for (i, k), decision in decided.items():
+            blocked = decision.point is not None
             margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
-            if decision.point is not None:
-                hit = _evidence(views[i], views[k], forward, decision.point, tolerance)
-                blockers += [hit, hit.reversed()]
-                free[forward][i, k] = free[opposite(forward)][k, i] = 0
+            free[forward][i, k] = free[opposite(forward)][k, i] = int(not blocked)
+        for hit in _evidence(views, forward, decided, tolerance):
+            blockers += [hit, hit.reversed()]
     return Interference(free, tuple(blockers), margin)
 
 
@@ -101,30 +103,58 @@ def first_hit(
         direction: "+x", "+y" or "+z".
         tolerance: Height of overlap and radius of the region that do not count [m].
     """
-    decision = decisions([moving, staying], tolerance).get((0, 1))
-    if decision is None or decision.point is None:
-        return None
-    return _evidence(moving, staying, direction, decision.point, tolerance)
+    views = [moving, staying]
+    decided = {parts: d for parts, d in decisions(views, tolerance).items() if parts == (0, 1)}
+    return next(_evidence(views, direction, decided, tolerance), None)
 
 
 def _evidence(
-    moving: Envelope, staying: Envelope, direction: str, point: np.ndarray, tolerance: float
-) -> Blocker:
-    height, travel = _nearest_faces(moving, staying, point, tolerance)
-    p_AoQ = np.empty(3)
-    p_AoQ[list(PLANE[axis_index(direction)])] = [*point, height]
-    x, y, z = (float(value) for value in p_AoQ)
-    return Blocker(moving.name, staying.name, direction, (x, y, z), travel)
+    views: Sequence[Envelope],
+    direction: str,
+    decided: Mapping[tuple[int, int], Decision],
+    tolerance: float,
+) -> Iterator[Blocker]:
+    """Yield where a part is hit, for each decision that has a blocked point."""
+    points = {parts: d.point for parts, d in decided.items() if d.point is not None}
+    seen = list(PLANE[axis_index(direction)])
+    floors = _heights([view.up for view in views], points, 0)
+    ceilings = _heights([view.down for view in views], points, 1)
+    tops = _heights([view.up for view in views], points, 1)
+    for (i, k), point in points.items():
+        height, travel = _nearest(floors[i, k], ceilings[i, k], tolerance)
+        if not np.isfinite(travel):  # Over this point the two share volume: they start blocked.
+            height, travel = float(np.max(tops[i, k], initial=views[k].low[2])), 0.0
+        p_AoQ = np.empty(3)
+        p_AoQ[seen] = [*point, height]
+        x, y, z = (float(value) for value in p_AoQ)
+        yield Blocker(views[i].name, views[k].name, direction, (x, y, z), travel)
 
 
-def _nearest_faces(
-    moving: Envelope, staying: Envelope, point: np.ndarray, tolerance: float
-) -> tuple[float, float]:
-    """Return the height of the staying face that is hit over a point, and the travel to it [m]."""
-    ceilings = staying.down.heights_over(point)
-    gaps = ceilings[None] - moving.up.heights_over(point)[:, None]
+def _heights(
+    faces: Sequence[Faces], points: Mapping[tuple[int, int], np.ndarray], place: int
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return the heights of faces over each pair's point, of the pair's part at place 0 or 1."""
+    own: dict[int, list[tuple[int, int]]] = {}
+    for parts in points:
+        own.setdefault(parts[place], []).append(parts)
+    found: dict[tuple[int, int], np.ndarray] = {}
+    for part, pairs in own.items():
+        over = heights_over(faces[part], np.array([points[parts] for parts in pairs]))
+        found |= dict(zip(pairs, over, strict=True))
+    return found
+
+
+def _nearest(floors: np.ndarray, ceilings: np.ndarray, tolerance: float) -> tuple[float, float]:
+    """Return the height of the face that is hit and the travel to it [m]; infinite if none is.
+
+    Args:
+        floors: Heights of the moving part's up-faces over a point [m].
+        ceilings: Heights of the staying part's down-faces over it [m].
+        tolerance: By how much they may overlap [m].
+    """
+    gaps = ceilings[None] - floors[:, None]
     ahead = np.where(gaps >= -tolerance, gaps, np.inf)
-    if not np.isfinite(ahead).any():  # Over this point the two share volume: they start blocked.
-        return float(np.max(staying.up.heights_over(point), initial=staying.low[2])), 0.0
+    if not ahead.size or not np.isfinite(ahead).any():
+        return 0.0, np.inf
     nearest = np.unravel_index(int(ahead.argmin()), ahead.shape)
     return float(ceilings[nearest[1]]), max(0.0, float(ahead[nearest]))

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import numpy as np
 
@@ -16,7 +15,7 @@ from planning.fixing.directions import DIRECTIONS
 from planning.fixing.interference import Interference, interference
 from planning.fixing.solids import Solid, solids_of
 from planning.fixing.threads import Thread
-from planning.fixing.tolerance import default_tolerance, largest_tolerance
+from planning.fixing.tolerance import PER_CLEARANCE, default_tolerance, largest_tolerance
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,52 +57,53 @@ def matrices_of(
     solids = solids_of(product) if solids is None else solids
     declared = product.contact_tolerance if tolerance is None else tolerance
     parts = list(solids.values())
-    reach = (1.0 + FRAGILE) * (declared or largest_tolerance(parts))
+    reach = max(1.0 + FRAGILE, 1.0 / PER_CLEARANCE) * (declared or largest_tolerance(parts))
     gaps = gap_matrix(parts, reach)
     tolerance = declared or default_tolerance(parts, gaps)
     leaving = interference(parts, tolerance)
-    fitted, threads = without_overlaps(product, solids, tolerance, _captive(solids, leaving))
-    cut = [name for name in solids if fitted[name] is not solids[name]]
-    for nut in cut:
-        leaving = _renewed(leaving, fitted, solids, nut, tolerance)
+    captive = _captive(gaps, leaving, tolerance)
+    names = list(solids)
+    suspects = [(names[i], names[k]) for i, k in np.argwhere(np.triu(captive, 1))]
+    fitted, threads = without_overlaps(product, solids, tolerance, suspects)
+    for nut, name in enumerate(names):
+        if fitted[name] is not solids[name]:
+            others = np.flatnonzero(captive[nut])
+            leaving = _renewed(leaving, list(fitted.values()), nut, others, tolerance)
     margin = np.minimum(np.abs(gaps - tolerance), FRAGILE * tolerance)
     return Matrices(solids, tolerance, contact_matrix(gaps, tolerance), margin, leaving, threads)
 
 
-def _captive(solids: Mapping[str, Solid], leaving: Interference) -> list[tuple[str, str]]:
-    """Return the pairs that block each other in all directions: all that may overlap are there."""
-    blocked = np.all([leaving.free[j] == 0 for j in DIRECTIONS], axis=0)
-    names = list(solids)
-    return [(names[i], names[k]) for i, k in combinations(range(len(names)), 2) if blocked[i, k]]
+def _captive(gaps: np.ndarray, leaving: Interference, tolerance: float) -> np.ndarray:
+    """Return (n, n) bool: the pairs that may overlap by more than the tolerance.
+
+    Their surfaces meet, and in no direction does one leave the other with margin to spare: a layer
+    of overlap between one and two tolerances thick is too narrow to block across it, but only just.
+    """
+    sure = FRAGILE * tolerance * (1.0 - 1e-9)
+    blocked = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
+    return (gaps == 0.0) & np.all(blocked, axis=0)
 
 
 def _renewed(
     leaving: Interference,
-    fitted: Mapping[str, Solid],
-    solids: Mapping[str, Solid],
-    nut: str,
+    fitted: Sequence[Solid],
+    nut: int,
+    others: np.ndarray,
     tolerance: float,
 ) -> Interference:
-    """Return the matrices with a nut's rows and columns computed anew, after its threads were cut.
+    """Return the matrices with a nut's entries computed anew, after its threads were cut.
 
-    Only towards parts that it overlapped: the rest of it is as it was.
+    Only towards the other parts that it may overlap: the rest of it is as it was.
     """
-    names = list(solids)
-    others = [n for n in names if n != nut and _blocked_all_ways(leaving, names, n, nut)]
     free = {j: matrix.copy() for j, matrix in leaving.free.items()}
     margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
     blockers = list(leaving.blockers)
     for other in others:
         pair = interference([fitted[other], fitted[nut]], tolerance)
-        i, k = names.index(other), names.index(nut)
         for j in DIRECTIONS:
             for values, new in ((free[j], pair.free[j]), (margin[j], pair.margin[j])):
-                values[i, k], values[k, i] = new[0, 1], new[1, 0]
-        blockers = [b for b in blockers if {b.moving, b.staying} != {other, nut}]
+                values[other, nut], values[nut, other] = new[0, 1], new[1, 0]
+        names = {fitted[other].name, fitted[nut].name}
+        blockers = [b for b in blockers if {b.moving, b.staying} != names]
         blockers += pair.blockers
     return Interference(free, tuple(blockers), margin)
-
-
-def _blocked_all_ways(leaving: Interference, names: list[str], a: str, b: str) -> bool:
-    i, k = names.index(a), names.index(b)
-    return all(leaving.free[j][i, k] == 0 for j in DIRECTIONS)

@@ -44,6 +44,24 @@ class Solid:
         return self.vertices.max(axis=0)
 
     @cached_property
+    def triangles(self) -> np.ndarray:
+        """(m, 3, 3) corners of each face in A [m]."""
+        return self.vertices[self.faces]
+
+    @cached_property
+    def doubled_areas(self) -> np.ndarray:
+        """(m, 3) outward normal of each face, twice its area long [m2]."""
+        a, b, c = (self.triangles[:, corner] for corner in range(3))
+        (ux, uy, uz), (vx, vy, vz) = (b - a).T, (c - a).T
+        return np.stack([uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx], axis=1)
+
+    @cached_property
+    def face_boxes(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper corners (m, 3) of each face's bounding box in A [m]."""
+        a, b, c = (self.triangles[:, corner] for corner in range(3))
+        return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+
+    @cached_property
     def manifold(self) -> manifold3d.Manifold:
         """The part for boolean operations."""
         mesh = manifold3d.Mesh64(self.vertices, self.faces.astype(np.uint64))
@@ -56,9 +74,14 @@ class Solid:
     @cached_property
     def proximity(self) -> fcl.CollisionObject:
         """The part's surface for distance queries."""
+        return self.proximity_of(np.arange(len(self.faces)))
+
+    def proximity_of(self, which: np.ndarray) -> fcl.CollisionObject:
+        """Return some of the part's faces, given by their indices, for distance queries."""
+        corners = self.triangles[which].reshape(-1, 3)
         tree = fcl.BVHModel()
-        tree.beginModel(len(self.vertices), len(self.faces))
-        tree.addSubModel(self.vertices, self.faces)
+        tree.beginModel(len(corners), len(which))
+        tree.addSubModel(corners, np.arange(len(corners)).reshape(-1, 3))
         tree.endModel()
         return fcl.CollisionObject(tree, fcl.Transform())
 

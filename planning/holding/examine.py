@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.product import Product
-from cell.soft_jig import SurfaceSamples
 from planning.fixing.algorithm import Geometry
 from planning.fixing.directions import axis_index, unit_vector
 from planning.fixing.solids import combined_cog
@@ -16,8 +15,8 @@ from planning.holding.candidate import Candidate, Setup
 from planning.holding.capacity import PUSHES, Load, sideways_capacity, turning_capacity
 from planning.holding.footprint import footprint, posture, standing_points
 from planning.holding.gravity import Gravity
-from planning.holding.gripper import STROKE, grip_width
-from planning.holding.imprint import Imprint, depth_in_bed, press, samples_of
+from planning.holding.gripper import STROKE, Gripper
+from planning.holding.imprint import Imprint, Surface, depth_in_bed, press, samples_of
 
 GRAVITY = 9.81  # [m/s2]
 FIT_FRICTION = 0.3  # [A] Of metal on metal, dry, 0.2-0.5: how much of an insertion's force a part
@@ -59,8 +58,9 @@ class Examiner:
 
     def __init__(self, product: Product, geometry: Geometry, setup: Setup) -> None:
         self.product, self.geometry, self.setup = product, geometry, setup
-        self.gravity = Gravity(product, geometry)
-        self._samples: dict[str, SurfaceSamples] = {}
+        self.gravity, self.gripper = Gravity(product, geometry), Gripper(product, geometry)
+        self._lows: dict[tuple[str, bytes], float] = {}
+        self._samples: dict[str, Surface] = {}
         self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
 
     def examine(self, trial: Trial) -> Candidate:
@@ -125,7 +125,7 @@ class Examiner:
         bodies = self.gravity.components(trial.moved) + ([] if trial.held else [trial.body])
         widths = []
         for parts in bodies:
-            width, possible = grip_width(self.product, self.geometry, parts, R_JA)
+            width, possible = self.gripper.width(parts, R_JA)
             if not possible:
                 raise Rejected(
                     f"no way to grip {_listed(parts)} in this posture: {1e3 * width:.0f} mm "
@@ -210,9 +210,13 @@ class Examiner:
         return np.round(middle, 3) + 0.0, self._lowest(trial.body, R_JA)
 
     def _lowest(self, names: Sequence[str], R_JA: np.ndarray) -> float:
-        return min(float((self.geometry.solids[n].vertices @ R_JA[2]).min()) for n in names)
+        key = R_JA.tobytes()
+        for name in (name for name in names if (name, key) not in self._lows):
+            vertices = self.geometry.solids[name].vertices
+            self._lows[name, key] = float((vertices @ R_JA[2]).min())
+        return min(self._lows[name, key] for name in names)
 
-    def _sampled(self, name: str) -> SurfaceSamples:
+    def _sampled(self, name: str) -> Surface:
         if name not in self._samples:
             self._samples[name] = samples_of(self.geometry.solids[name])
         return self._samples[name]

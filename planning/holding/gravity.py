@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from scipy.sparse.csgraph import connected_components
@@ -21,15 +21,20 @@ class Gravity:
     Attributes:
         product: For its fasteners.
         geometry: Contact, interference and shapes.
+        pieces: What ``components`` has found: every posture of a step asks for the same sets.
     """
 
     product: Product
     geometry: Geometry
+    pieces: dict[tuple[str, ...], list[tuple[str, ...]]] = field(default_factory=dict)
 
     def components(self, parts: Sequence[str]) -> list[tuple[str, ...]]:
         """Return the pieces of a set of parts that hang together through contacts."""
-        at = self.geometry.indices(tuple(parts))
-        return _grouped(parts, self.geometry.contact[np.ix_(at, at)])
+        key = tuple(parts)
+        if key not in self.pieces:
+            at = self.geometry.indices(key)
+            self.pieces[key] = _grouped(parts, self.geometry.contact[np.ix_(at, at)])
+        return self.pieces[key]
 
     def falling(self, body: Sequence[str], up: str) -> list[str]:
         """Return the parts of a body on the jig that would fall, with ``up`` up.
