@@ -80,8 +80,12 @@ LIMITS = (
     Limit("place_bolts", "base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
     Limit("tighten_bolts", "torque_deviation", 0.10, "what clutch drivers repeat", each="parts"),
     Limit("tighten_bolts", "advance_deviation", 0.02, "the bolt follows its helix", each="parts"),
-    Limit("tighten_bolts", "clamp_deviation", 0.15, "against T / (K d); K scatters so", each="parts"),
-    Limit("tighten_bolts", "clamp_deviation_at_end", 0.15, "later bolts relax earlier ones", "parts"),
+    Limit(
+        "tighten_bolts", "clamp_deviation", 0.15, "against T / (K d); K scatters so", each="parts"
+    ),
+    Limit(
+        "tighten_bolts", "clamp_deviation_at_end", 0.15, "later bolts relax earlier ones", "parts"
+    ),
     Limit("tighten_bolts", "base_moved_since_placed_m", 1e-3, STILL),
     Limit("tighten_bolts", "base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
 )

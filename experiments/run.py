@@ -216,7 +216,5 @@ def read_final_state(path: Path) -> State:
 def final_state(run: Run) -> State:
     """Return the state that a run ended in, the operations that led to it, and what is known."""
     names = [*run.done, *(step.name for step in run.steps)]
-    origins = {
-        f"{ORIGIN}{name}": X_WP.GetAsMatrix4() for name, X_WP in run.station.origins.items()
-    }
+    origins = {f"{ORIGIN}{name}": X_WP.GetAsMatrix4() for name, X_WP in run.station.origins.items()}
     return {**save_state(run.simulation), **origins, DONE: np.array(names, dtype=str)}

@@ -135,7 +135,10 @@ def seize(
 
 def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[Phase]:
     """Yield the phase that takes the part in the hand straight up by a height [m]."""
-    X_WJaw, frame = station.pose("left", reach.grasp.jaw), station.arm("left").frame(reach.grasp.jaw)
+    X_WJaw, frame = (
+        station.pose("left", reach.grasp.jaw),
+        station.arm("left").frame(reach.grasp.jaw),
+    )
     up = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() + [0.0, 0.0, height])
     yield Phase(
         f"{part}: lift",

@@ -53,9 +53,7 @@ def operations(product: Product, plan: FixingPlan) -> list[Operation]:
     return schedule.result
 
 
-def fixed_after(
-    product: Product, fixed: tuple[str, ...], operation: Operation
-) -> tuple[str, ...]:
+def fixed_after(product: Product, fixed: tuple[str, ...], operation: Operation) -> tuple[str, ...]:
     """Return what the jig holds, bolts apart, after an operation that began with ``fixed`` on it."""
     if operation.kind == "pick_place":
         return operation.parts

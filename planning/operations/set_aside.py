@@ -100,13 +100,17 @@ def touches(sensed: Sensed) -> bool:
 
 
 def _useful(station: Station, part: str, X_WGoal: RigidTransform) -> Iterator[Reach]:
-    """Yield grasps of the part on the jig with which the hand also reaches its place."""
+    """Yield grasps of the part on the jig with which the hand also reaches its place.
+
+    There, as at every grasp, the fingers are not checked: they are opened for another part by now.
+    """
     grasps = station.part(part).grasps
     for reach in reachable_grasps(station, part, station.sense(part), grasps):
-        jaw = station.arm("left").frame(reach.grasp.jaw)
-        goals = [raised(X_WGoal, height) @ reach.grasp.X_PJaw for height in (ABOVE, 0.0)]
-        may_touch = [("left_tool", part), ("held", "*")]
-        if comes_from_above(X_WGoal, reach.grasp.X_PJaw) and all(
-            station.configurations("left", jaw, X, reach.q_before, may_touch) for X in goals
+        jaw, near = station.arm("left").frame(reach.grasp.jaw), reach.q_before
+        X_WAbove, X_WAt = (raised(X_WGoal, height) @ reach.grasp.X_PJaw for height in (ABOVE, 0.0))
+        if (
+            comes_from_above(X_WGoal, reach.grasp.X_PJaw)
+            and station.configurations("left", jaw, X_WAbove, near, [("left_tool", part)])
+            and station.configurations("left", jaw, X_WAt, near, [("left_tool", "*")])
         ):
             yield reach
