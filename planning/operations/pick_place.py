@@ -20,7 +20,7 @@ from planning.operations.grasping import (
     reachable_grasps,
     take,
 )
-from planning.operations.placement import HOVER, Placement, choose_placement
+from planning.operations.placement import HOVER, RETREAT, Placement, choose_placement
 from planning.operations.station import Station
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
@@ -28,7 +28,7 @@ PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M]
 # Pressing fails if the bed has not resisted this far below its apex [m] [A]: the plate's foot is
 # 15 mm deep before its face comes to lie on the bed.
 DEEPEST = 0.03
-RETREAT = 0.08
+STOP_TIME = 0.2  # [s] [A]
 JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
 SETTLE_TIME = 1.0
 
@@ -73,6 +73,8 @@ def pick_place(
         start=(soften_jig(part),),
         awake=awake,
     )
+    # The hand comes to rest first: what moves then is not moved by the freezing.
+    yield Phase(f"{part}: stop", after(STOP_TIME), 1.0, guard=holding, awake=awake, tare=False)
     yield Phase(
         f"{part}: jam",
         jammed(station, JAM_TIME),

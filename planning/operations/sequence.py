@@ -54,7 +54,7 @@ def operations(product: Product, plan: FixingPlan) -> list[Operation]:
 
 
 def fixed_after(product: Product, fixed: tuple[str, ...], operation: Operation) -> tuple[str, ...]:
-    """Return what the jig holds, bolts apart, after an operation that began with ``fixed`` on it."""
+    """Return what the jig holds, bolts apart, after an operation; ``fixed``: before it."""
     if operation.kind == "pick_place":
         return operation.parts
     if operation.kind == "set_aside":
