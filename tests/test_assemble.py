@@ -26,6 +26,7 @@ from experiments.run import Run, go_on
 from planning.fixing.planner import plan
 from planning.operations import insert_shaft
 from planning.operations.carry_out import phases
+from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import goal_pose
 from planning.operations.sequence import Operation, operations
 from planning.operations.station import Station
@@ -157,6 +158,25 @@ def test_run_that_goes_on_knows_what_is_fixed_and_where_it_was_taken_from(run: R
     assert [operation.kind for operation in left] == ["insert_shaft", "tighten_bolts"]
     assert again.station.fixed == ("motor",)
     assert again.station.origins["plate"].IsExactlyEqualTo(origin)
+
+
+def test_riders_are_planned_and_weighed_with_what_carries_them(run: Run) -> None:
+    """On the hand, not in the way of it; nothing is left in it when it has let go."""
+    station, riders = run.station, ("bolt_1", "bolt_2")
+    station.held, station.riders = "plate", riders
+    around = station.surroundings()
+    assert set(around.X_HandP) == {"plate", *riders}
+    assert not set(around.X_HandP) & set(around.X_WP)
+    carried = station._payload()
+    assert carried is not None
+    assert carried.get_mass() == pytest.approx(
+        sum(PRODUCT.parts[name].mass for name in station.in_hand)
+    )
+    grasp = PRODUCT.parts["plate"].grasps[0]
+    pending = let_go(station, "plate", grasp, 0.02, frozenset())
+    next(pending)
+    next(pending)
+    assert station.in_hand == ()
 
 
 def some_phases(run: Run, count: int) -> Iterator[Phase]:
