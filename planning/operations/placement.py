@@ -112,12 +112,13 @@ def _leaves(station: Station, reach: Reach, X_WJaw: RigidTransform, q: np.ndarra
     """Return whether the hand can back off straight from a jaw pose, with joints near ``q``."""
     arm, context = station.arm("left"), station.context
     frame = arm.frame(reach.grasp.jaw)
-    at = ik_solutions(arm, context, frame, X_WJaw, q)
     try:
-        plan_line(arm, context, frame, at[0], backed_off(X_WJaw, RETREAT))
-    except (IndexError, Unreachable, NoPath):
-        return False
-    return True
+        for q_at in ik_solutions(arm, context, frame, X_WJaw, q)[:1]:
+            plan_line(arm, context, frame, q_at, backed_off(X_WJaw, RETREAT))
+            return True
+    except (Unreachable, NoPath):
+        pass
+    return False
 
 
 def _mates(station: Station, part: str, X_WA: RigidTransform) -> bool:
