@@ -22,6 +22,7 @@ from experiments import shaft_insertion
 from experiments.assemble import run_assemble, run_job
 from experiments.job import Job
 from experiments.prepare import Disturbance, running_cell
+from experiments.record import OperationRecord
 from experiments.run import Run, go_on
 from planning.fixing.planner import plan
 from planning.operations import insert_shaft
@@ -158,6 +159,23 @@ def test_run_that_goes_on_knows_what_is_fixed_and_where_it_was_taken_from(run: R
     assert [operation.kind for operation in left] == ["insert_shaft", "tighten_bolts"]
     assert again.station.fixed == ("motor",)
     assert again.station.origins["plate"].IsExactlyEqualTo(origin)
+
+
+def test_motion_on_the_jig_counts_from_the_latest_placement(run: Run) -> None:
+    """What was on the jig before has been taken off; a run may also begin with a part on it."""
+    now = run_module.take_snapshot(run.simulation)
+    ends = [replace(now, time=float(k)) for k in range(4)]
+    kinds = ("pick_place", "set_aside", "pick_place", "insert_shaft")
+    run.records = [
+        OperationRecord(Operation(kind, kind, ("plate",)), now, end=end)
+        for kind, end in zip(kinds, ends, strict=True)
+    ]
+    run.station.fixed = ("motor",)
+    tighten = Operation("tighten bolts", "tighten_bolts", ("bolt_1",))
+    assert run._record(tighten).placed is ends[2]
+    run.records = run.records[3:]
+    assert run._record(tighten).placed is now
+    assert run._record(tighten).base == "motor"
 
 
 def test_riders_are_planned_and_weighed_with_what_carries_them(run: Run) -> None:
