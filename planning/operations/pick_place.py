@@ -28,7 +28,7 @@ PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M]
 # Pressing fails if the bed has not resisted this far below its apex [m] [A]: the plate's foot is
 # 15 mm deep before its face comes to lie on the bed.
 DEEPEST = 0.03
-STOP_TIME = 0.2  # [s] [A]
+HOVER_TIME, STOP_TIME = 0.1, 0.2  # [s] [A]
 JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
 SETTLE_TIME = 1.0
 
@@ -62,6 +62,8 @@ def pick_place(
         guard=holding,
         awake=awake,
     )
+    # The wrist is tared at rest: the braking arm feels 2 N of its own [M].
+    yield Phase(f"{part}: hover", after(HOVER_TIME), 1.0, guard=holding, awake=awake)
     down = HOVER + DEEPEST
     deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, down])
     yield Phase(
