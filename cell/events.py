@@ -32,6 +32,15 @@ def press_into_bed(simulation: Simulation, part: str) -> None:
     cell.soft_jig.press_with(cell.parts[part].body, samples)
 
 
+def release_from_jig(part: str) -> Event:
+    """Let the bed forget a part that has been lifted off it."""
+
+    def event(simulation: Simulation) -> None:
+        simulation.cell.soft_jig.release(simulation.cell.parts[part].body)
+
+    return event
+
+
 def evacuate_jig(simulation: Simulation) -> None:
     """Start the vacuum pump."""
     simulation.cell.soft_jig.evacuate(simulation.root)

@@ -41,6 +41,7 @@ class OperationRecord:
         start, end: The truth around it.
         base: Name of the part that the jig holds; None before one is placed.
         placed: The truth when it had been placed, or when the run began with it on the jig.
+        origin: X_WP from which the part that is moved was once taken to the jig, if it was.
         phases: By name; a name occurs once in an operation.
     """
 
@@ -48,6 +49,7 @@ class OperationRecord:
     start: Snapshot
     base: str | None = None
     placed: Snapshot | None = None
+    origin: RigidTransform | None = None
     phases: dict[str, PhaseRecord] = field(default_factory=dict)
     end: Snapshot | None = None
 

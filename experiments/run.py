@@ -10,6 +10,7 @@ from typing import Protocol, cast
 from zipfile import BadZipFile
 
 import numpy as np
+from pydrake.math import RigidTransform
 
 from cell.errors import CellError
 from cell.phase import Outcome, Phase, PhaseFailed
@@ -19,10 +20,12 @@ from experiments.criteria import FailedCheck, failed_checks
 from experiments.metrics.measure import measure
 from experiments.record import OperationRecord, PhaseRecord
 from experiments.snapshot import take_snapshot
-from planning.operations.sequence import Operation, phases
+from planning.operations.carry_out import phases
+from planning.operations.sequence import Operation, fixed_after
 from planning.operations.station import Station
 
 DONE = "operations_done"  # In a saved state: names of the operations before it.
+ORIGIN = "origin/"  # In a saved state: before the name of a part, where it was taken from.
 
 
 @dataclass(frozen=True)
@@ -141,14 +144,17 @@ class Run:
 
     def _record(self, operation: Operation) -> OperationRecord:
         now = take_snapshot(self.simulation)
+        origin = self.station.origins.get(operation.parts[0])
         if not self.station.fixed:
-            return OperationRecord(operation, now)
+            return OperationRecord(operation, now, origin=origin)
         placed = now
-        if self.records and self.records[0].operation.kind == "pick_place":
-            placed = self.records[0].end
-        elif self.records:
-            placed = self.records[0].start
-        return OperationRecord(operation, now, self.station.fixed[0], placed)
+        for record in self.records:
+            # The latest part that was placed, in this run or before it.
+            if record.operation.kind == "pick_place":
+                placed = record.end
+            elif placed is now:
+                placed = record.start
+        return OperationRecord(operation, now, self.station.fixed[0], placed, origin)
 
     def _watched(self, record: OperationRecord) -> Generator[Phase, Outcome, None]:
         """Yield the phases of an operation on, with a record of each."""
@@ -187,8 +193,12 @@ def go_on(run: Run, operations: Sequence[Operation], state: State) -> list[Opera
     restore_state(run.simulation, state)
     run.done = tuple(done)
     for operation in operations[: len(done)]:
-        if operation.kind in ("pick_place", "insert_shaft"):
-            run.station.fixed += operation.parts
+        run.station.fixed = fixed_after(run.station.cell.product, run.station.fixed, operation)
+    run.station.origins = {
+        name.removeprefix(ORIGIN): RigidTransform(X_WP)
+        for name, X_WP in state.items()
+        if name.startswith(ORIGIN)
+    }
     return list(operations[len(done) :])
 
 
@@ -204,6 +214,7 @@ def read_final_state(path: Path) -> State:
 
 
 def final_state(run: Run) -> State:
-    """Return the state that a run ended in, with the names of the operations that led to it."""
+    """Return the state that a run ended in, the operations that led to it, and what is known."""
     names = [*run.done, *(step.name for step in run.steps)]
-    return {**save_state(run.simulation), DONE: np.array(names, dtype=str)}
+    origins = {f"{ORIGIN}{name}": X_WP.GetAsMatrix4() for name, X_WP in run.station.origins.items()}
+    return {**save_state(run.simulation), **origins, DONE: np.array(names, dtype=str)}

@@ -14,7 +14,7 @@ from cell.config import CellConfig
 from cell.errors import BadOrder, CellError
 from cell.loading import load_product
 from cell.phase import Outcome, Phase, after
-from cell.product import Fit
+from cell.product import Fit, Product
 from cell.simulation import Simulation
 from cell.state import State, read_state, restore_state, save_state
 from experiments import run as run_module
@@ -22,11 +22,14 @@ from experiments import shaft_insertion
 from experiments.assemble import run_assemble, run_job
 from experiments.job import Job
 from experiments.prepare import Disturbance, running_cell
+from experiments.record import OperationRecord
 from experiments.run import Run, go_on
 from planning.fixing.planner import plan
 from planning.operations import insert_shaft
+from planning.operations.carry_out import phases
+from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import goal_pose
-from planning.operations.sequence import Operation, operations, phases
+from planning.operations.sequence import Operation, operations
 from planning.operations.station import Station
 
 PRODUCT = load_product("motor_unit")
@@ -45,16 +48,21 @@ def result_in(out: Path) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(
-    ("order", "evidence"),
+    ("product", "order", "evidence"),
     [
-        (("motor", "bolts", "plate"), "blocked in all six directions"),
-        (("plate", "bolts", "motor"), "one part on the jig only"),
+        (PRODUCT, ("motor", "bolts", "plate"), "blocked in all six directions"),
+        (replace(PRODUCT, fits=()), ("motor", "plate", "bolts"), "nor the hole of a fit"),
     ],
 )
 def test_order_that_cannot_be_carried_out_is_a_failure(
-    order: tuple[str, ...], evidence: str, tmp_path: Path, capsys: pytest.CaptureFixture
+    product: Product,
+    order: tuple[str, ...],
+    evidence: str,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture,
 ) -> None:
-    assert run_assemble(**options(tmp_path, order=order, quiet=False)) == 1
+    changes = dict(product=product, order=order, quiet=False)
+    assert run_assemble(**options(tmp_path, **changes)) == 1
     assert evidence in capsys.readouterr().out
     result = result_in(tmp_path)
     assert result["verdict"] == "failure"
@@ -138,6 +146,55 @@ def test_saved_state_of_another_order_is_refused(run: Run) -> None:
     todo = operations(PRODUCT, plan(PRODUCT))
     with pytest.raises(CellError, match="after insert plate; the plan begins with place motor"):
         go_on(run, todo, {"operations_done": np.array(["insert plate"])})
+
+
+def test_run_that_goes_on_knows_what_is_fixed_and_where_it_was_taken_from(run: Run) -> None:
+    """After the plate was set aside and the motor placed, in another process."""
+    todo = operations(PRODUCT, plan(PRODUCT, ("plate", "bolts", "motor")))
+    origin = run.station.sense("plate")
+    run.done = tuple(operation.name for operation in todo[:4])
+    run.station.origins["plate"] = origin
+    again = Run(*running_cell(PRODUCT, CONFIG, seed=0))
+    left = go_on(again, todo, run_module.final_state(run))
+    assert [operation.kind for operation in left] == ["insert_shaft", "tighten_bolts"]
+    assert again.station.fixed == ("motor",)
+    assert again.station.origins["plate"].IsExactlyEqualTo(origin)
+
+
+def test_motion_on_the_jig_counts_from_the_latest_placement(run: Run) -> None:
+    """What was on the jig before has been taken off; a run may also begin with a part on it."""
+    now = run_module.take_snapshot(run.simulation)
+    ends = [replace(now, time=float(k)) for k in range(4)]
+    kinds = ("pick_place", "set_aside", "pick_place", "insert_shaft")
+    run.records = [
+        OperationRecord(Operation(kind, kind, ("plate",)), now, end=end)
+        for kind, end in zip(kinds, ends, strict=True)
+    ]
+    run.station.fixed = ("motor",)
+    tighten = Operation("tighten bolts", "tighten_bolts", ("bolt_1",))
+    assert run._record(tighten).placed is ends[2]
+    run.records = run.records[3:]
+    assert run._record(tighten).placed is now
+    assert run._record(tighten).base == "motor"
+
+
+def test_riders_are_planned_and_weighed_with_what_carries_them(run: Run) -> None:
+    """On the hand, not in the way of it; nothing is left in it when it has let go."""
+    station, riders = run.station, ("bolt_1", "bolt_2")
+    station.held, station.riders = "plate", riders
+    around = station.surroundings()
+    assert set(around.X_HandP) == {"plate", *riders}
+    assert not set(around.X_HandP) & set(around.X_WP)
+    carried = station._payload()
+    assert carried is not None
+    assert carried.get_mass() == pytest.approx(
+        sum(PRODUCT.parts[name].mass for name in station.in_hand)
+    )
+    grasp = PRODUCT.parts["plate"].grasps[0]
+    pending = let_go(station, "plate", grasp, 0.02, frozenset())
+    next(pending)
+    next(pending)
+    assert station.in_hand == ()
 
 
 def some_phases(run: Run, count: int) -> Iterator[Phase]:
@@ -246,6 +303,21 @@ def test_whole_assembly_succeeds_and_rests(tmp_path: Path) -> None:
     assert kinds == ["pick_place", "insert_shaft", "place_bolts", "tighten_bolts"]
     assert not [check for step in result["steps"] for check in step["failed_checks"]]
     assert_at_rest(energies_at_rest(tmp_path / "state.npz"))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("product", "order"),
+    [("motor_unit", ("plate", "bolts", "motor")), ("idler", None)],
+)
+def test_other_orders_and_products_succeed_by_the_same_code(
+    product: str, order: tuple[str, ...] | None, tmp_path: Path
+) -> None:
+    assert run_assemble(**options(tmp_path, product=load_product(product), order=order)) == 0
+    steps = result_in(tmp_path)["steps"]
+    assert not [check for step in steps for check in step["failed_checks"]]
+    if order is not None:
+        assert "set_aside" in [step["operation"] for step in steps]
 
 
 @pytest.mark.slow

@@ -11,8 +11,8 @@ import pytest
 import trimesh
 from solids import assert_same_solid
 
+from cell.cad import idler, tray
 from cell.cad import motor_unit as mu
-from cell.cad import tray
 from cell.cad.shapes import revolved_surface, vertex_radius
 from cell.loading import load_product
 from cell.paths import MODELS
@@ -20,6 +20,9 @@ from cell.sdf import Model
 
 MM3 = 1e-9
 OWN_MODELS = ("motor", "motor_plate", "bolt_m3x10", "motor_unit_tray")
+OWN_MODELS += ("idler_post", "idler_arm", "idler_tray")
+PART_MODELS = (mu.motor_model(), mu.plate_model(), mu.bolt_model())
+PART_MODELS += (idler.post_model(), idler.arm_model())
 
 
 def whole(model: Model) -> trimesh.Trimesh:
@@ -33,7 +36,7 @@ def surfaces(model: Model) -> dict[str, trimesh.Trimesh]:
     return {name: s for name, s in shapes.items() if isinstance(s, trimesh.Trimesh)}
 
 
-@pytest.mark.parametrize("model", [mu.motor_model(), mu.plate_model(), mu.bolt_model()])
+@pytest.mark.parametrize("model", PART_MODELS, ids=lambda model: model.name)
 def test_parts_are_closed_solids(model: Model) -> None:
     assert whole(model).is_volume
     for piece in model.pieces:
@@ -76,6 +79,17 @@ def test_assembled_parts_do_not_overlap() -> None:
     bolt = mu.bolt_solid().translate([*mu.bolt_xy()[1], mu.PLATE_THICKNESS])
     for one, other in [(motor, plate), (plate, bolt), (motor, bolt)]:
         assert (one ^ other).volume() < 1e-6  # mm3; touching faces are exactly coincident.
+
+
+def test_idler_overlaps_in_its_threads_only() -> None:
+    """Each bolt shares a thin tube with its tap-drilled hole: nominal against drilled diameter."""
+    post, arm = idler.post_solid(), idler.arm_solid()
+    assert (post ^ arm).volume() < 1e-6  # mm3
+    for x, y in idler.BOLT_XY:
+        bolt = mu.bolt_solid().translate([x, y, mu.PLATE_THICKNESS])
+        assert (arm ^ bolt).volume() < 1e-6
+        tube = np.pi * (mu.THREAD_RADIUS**2 - idler.TAP_DRILL_RADIUS**2) * 5.0
+        assert (post ^ bolt).volume() == pytest.approx(tube, rel=0.05)
 
 
 def test_shank_and_threaded_hole_coincide() -> None:
@@ -166,7 +180,7 @@ def test_revolved_surface_has_the_volume_of_the_round_one() -> None:
 
 
 def test_committed_models_are_what_the_code_writes(tmp_path: Path) -> None:
-    for module in (mu, tray):
+    for module in (mu, tray, idler):
         module.write_models(tmp_path)
     for name in OWN_MODELS:
         new, kept = tmp_path / name, MODELS / "sdf" / name

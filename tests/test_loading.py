@@ -51,13 +51,20 @@ def test_motor_unit_is_complete() -> None:
         assert z == pytest.approx(5e-3)
 
 
-def test_grasps_close_on_the_part() -> None:
-    """Both points at half the width from the jaw's origin, along its x, lie on the surface."""
-    for part in load_product("motor_unit").parts.values():
+@pytest.mark.parametrize("product", ["motor_unit", "idler"])
+def test_grasps_close_on_the_part(product: str) -> None:
+    """Both points at half the width from the jaw's axis, along its x, lie on the surface.
+
+    In the middle of the pads or 5 mm ahead of it: they reach 7 mm or more ahead.
+    """
+    for part in load_product(product).parts.values():
         for grasp in part.grasps:
-            ends = [grasp.X_PJaw @ np.array([s * grasp.width / 2, 0, 0]) for s in (-1, 1)]
-            closest = trimesh.proximity.closest_point_naive(part.mesh, np.array(ends))[1]
-            assert np.max(closest) < 2e-5  # Sagitta of the drawn 64 and 96 facets: 7 to 10 um.
+            offsets = []
+            for ahead in (0.0, 5e-3):
+                ends = [grasp.X_PJaw @ np.array([s * grasp.width / 2, 0, ahead]) for s in (-1, 1)]
+                closest = trimesh.proximity.closest_point_naive(part.mesh, np.array(ends))[1]
+                offsets.append(np.max(closest))
+            assert min(offsets) < 2e-5  # Sagitta of the drawn 64 and 96 facets: 7 to 10 um.
 
 
 def test_yaml_reads_units_poses_and_masses(folder: Path) -> None:

@@ -1,16 +1,20 @@
 """What an assembly is judged by, on states made by hand."""
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from cell.builder import Cell
 from cell.loading import load_product
 from experiments.criteria import LIMITS, failed_checks
 from experiments.metrics.bolts import advance, clamp_target, standing, torque_shares, trip
 from experiments.metrics.common import force_plate_peaks, moved
-from experiments.metrics.insert import seat_errors
+from experiments.metrics.insert import riders_standing, seat_errors
+from experiments.metrics.loose import in_hole, measure_set_aside
 from experiments.metrics.place import placement_errors
 from experiments.record import OperationRecord, PhaseRecord, rows_between
 from experiments.snapshot import Snapshot, Wrench
@@ -18,6 +22,7 @@ from planning.operations.sequence import Operation
 
 PRODUCT = load_product("motor_unit")
 BOLT = PRODUCT.fasteners["bolt_1"]
+CELL = cast(Cell, SimpleNamespace(product=PRODUCT))
 
 
 def snapshot(**changes) -> Snapshot:
@@ -176,3 +181,59 @@ def test_what_remains_is_read_while_the_bolt_is_awake() -> None:
     record.phases["plate: retreat"] = PhaseRecord(late, asleep, {})
     assert record.last_awake("bolt_1") is late
     assert record.last_awake("plate") is None
+
+
+def test_loose_bolt_is_judged_in_the_hole_of_what_it_clamps() -> None:
+    """Wherever that is: it stands off, leans about the hole's upper end, or passes beside it."""
+    state = snapshot()
+    hanging = in_hole(PRODUCT, "bolt_2", state)
+    assert hanging == pytest.approx({"proud_m": 0.0, "off_hole_m": 0.0, "lean_rad": 0.0}, abs=1e-7)
+    # The axis leans by 0.05 about the middle of the hole's upper end, 4 mm below the head.
+    lean = RigidTransform(RollPitchYaw(0.05, 0.0, 0.0), np.zeros(3))
+    leaning = in_hole(
+        PRODUCT, "bolt_2", moved_part(state, "bolt_2", lean @ RigidTransform([0.0, 0.0, 4e-3]))
+    )
+    assert leaning["proud_m"] == pytest.approx(4e-3 * np.cos(0.05))
+    assert leaning["off_hole_m"] == pytest.approx(0.0, abs=1e-9)
+    assert leaning["lean_rad"] == pytest.approx(0.05)
+    beside = in_hole(PRODUCT, "bolt_2", moved_part(state, "bolt_2", RigidTransform([1e-3, 0, 0])))
+    assert beside["off_hole_m"] == pytest.approx(1e-3)
+
+
+def test_bolts_that_rode_in_are_judged_on_their_threads() -> None:
+    """Only bolts are, and each has to stand as if the hand had set it."""
+    stands = RigidTransform([0.0, 0.0, BOLT.thread_depth + 2e-4])
+    state = snapshot(X_HF=dict.fromkeys(PRODUCT.fasteners, stands))
+    measured = riders_standing(PRODUCT, ("plate", "bolt_1"), state)
+    assert set(measured) == {
+        f"bolt_1/standing_{name}" for name in ("axial_m", "lateral_m", "tilt_rad")
+    }
+    assert measured["bolt_1/standing_axial_m"] == pytest.approx(2e-4)
+    back = Operation("insert plate", "insert_shaft", ("plate",), None, ("bolt_1",))
+    missing = {check.quantity for check in failed_checks(back, {})}
+    assert "bolt_1/standing_axial_m" in missing
+    alone = Operation("insert plate", "insert_shaft", ("plate",))
+    assert not any("standing" in check.quantity for check in failed_checks(alone, {}))
+
+
+def test_part_set_aside_is_compared_with_where_it_was_taken_from() -> None:
+    operation = Operation("set aside plate", "set_aside", ("plate",), None, ("bolt_1",))
+    before = snapshot()
+    shift = RigidTransform(RollPitchYaw(0.0, 0.0, 0.02), [3e-4, 4e-4, 0.0])
+    both = moved_part(before, "plate", shift)
+    origin = before.X_WP["plate"]
+    record = OperationRecord(operation, before, origin=origin, end=both)
+    assert measure_set_aside(CELL, record, {}) == {}  # It has not been set down.
+    for phase in ("set down", "settle"):
+        record.phases[f"plate: {phase}"] = PhaseRecord(before, both, {"left": 3.1})
+    measured = measure_set_aside(CELL, record, {})
+    assert measured["return_error_m"] == pytest.approx(5e-4)
+    assert measured["return_angle_rad"] == pytest.approx(0.02)
+    assert measured["lowered_force_peak_N"] == 3.1
+    assert measured["bolt_1/off_hole_m"] == pytest.approx(np.hypot(*_left_behind(shift)), abs=1e-9)
+
+
+def _left_behind(X_PlatePlate: RigidTransform) -> np.ndarray:
+    """Return the offset (2,) of bolt 1 from its hole in a plate that moved without it."""
+    p_PB = PRODUCT.parts["bolt_1"].X_AP.translation()
+    return (X_PlatePlate.inverse() @ p_PB - p_PB)[:2]

@@ -41,5 +41,5 @@ def test_range_is_over_runs_and_parts() -> None:
     step = {"operation": "tighten_bolts", "measured": {"b1/x": 1.0, "b2/x": -2.0, "b1/y": 9.0}}
     other = {"operation": "place_bolts", "measured": {"b1/x": 50.0}}
     results = [{"steps": [step, other]}, {"steps": [{**step, "measured": {"b1/x": 3.0}}]}]
-    assert repeat._range(Limit("tighten_bolts", "x", 1.0, "", True), results) == (-2.0, 3.0)
+    assert repeat._range(Limit("tighten_bolts", "x", 1.0, "", "parts"), results) == (-2.0, 3.0)
     assert repeat._range(Limit("pick_place", "x", 1.0, ""), results) is None

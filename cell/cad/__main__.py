@@ -5,12 +5,13 @@ from __future__ import annotations
 import sys
 from pathlib import Path
 
-from cell.cad import motor_unit, robots, tray, workcell
+from cell.cad import idler, motor_unit, robots, tray, workcell
 from cell.paths import MODELS
 
 WRITERS = [
     motor_unit.write_models,
     tray.write_models,
+    idler.write_models,
     robots.write_models,
     workcell.write_models,
 ]

@@ -164,17 +164,21 @@ def plate_solid() -> Manifold:
     top, bottom = PLATE_THICKNESS, FOOT_BOTTOM
     plate = box((-PLATE_X, PLATE_Y_LOW, 0), (PLATE_X, PLATE_Y_HIGH, top))
     plate += box((-PLATE_X, PLATE_Y_LOW, bottom), (PLATE_X, PLATE_Y_LOW + FOOT_THICKNESS, top))
-    wide = BORE_RADIUS + EDGE_BREAK
-    bore = cylinder(BORE_RADIUS, -1, top + 1, BORE_FACETS)
-    bore += cone(wide + 1, wide - EDGE_BREAK, -1, EDGE_BREAK, BORE_FACETS)
-    bore += cone(wide - EDGE_BREAK, wide + 1, top - EDGE_BREAK, top + 1, BORE_FACETS)
-    plate -= bore.translate([0, SHAFT_Y, 0])
+    plate -= bore_solid().translate([0, SHAFT_Y, 0])
     for x, y in bolt_xy():
         plate -= cylinder(BOLT_HOLE_RADIUS, -1, top + 1, 48).translate([x, y, 0])
     for x in (-FOOT_HOLE_X, FOOT_HOLE_X):
         hole = cylinder(FOOT_HOLE_RADIUS, -10, 10, 48).rotate([90, 0, 0])
         plate -= hole.translate([x, PLATE_Y_LOW, FOOT_HOLE_Z])
     return plate
+
+
+def bore_solid() -> Manifold:
+    """Return what the bore takes away of a plate, about the z axis [mm]."""
+    wide, top = BORE_RADIUS + EDGE_BREAK, PLATE_THICKNESS
+    bore = cylinder(BORE_RADIUS, -1, top + 1, BORE_FACETS)
+    bore += cone(wide + 1, wide - EDGE_BREAK, -1, EDGE_BREAK, BORE_FACETS)
+    return bore + cone(wide - EDGE_BREAK, wide + 1, top - EDGE_BREAK, top + 1, BORE_FACETS)
 
 
 def bolt_solid() -> Manifold:
@@ -191,12 +195,6 @@ def motor_pieces() -> list[Piece]:
     samples see, and nothing else ever reaches them.
     """
     metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
-    nose = convex_revolve(
-        _mm([(BOSS_RADIUS, -1.0), (BOSS_RADIUS, BOSS_END - EDGE_BREAK)])
-        + _mm([(BOSS_RADIUS - EDGE_BREAK, BOSS_END)]),
-        BOSS_FACETS,
-        center=(0, SHAFT_Y * MM),
-    )
     return [
         Piece("bed_can", _can_surface(), Contact(0.9)),
         Piece(
@@ -205,9 +203,16 @@ def motor_pieces() -> list[Piece]:
         # As a convex solid its pressure grows evenly under the whole face, and few tetrahedra meet
         # the plate.
         Piece("seat", _prism(SEAT_FACETS, -SEAT_DEPTH, 0.0), metal, convex=True),
-        Piece("boss", nose, metal, convex=True),
-        _upright_cylinder("shaft", SHAFT_RADIUS, 0, SHAFT_END, metal, hint=2.0, y=SHAFT_Y),
+        Piece("boss", boss_surface((0, SHAFT_Y * MM)), metal, convex=True),
+        upright_cylinder("shaft", SHAFT_RADIUS, 0, SHAFT_END, metal, hint=2.0, y=SHAFT_Y),
     ]
+
+
+def boss_surface(center: tuple[float, float]) -> trimesh.Trimesh:
+    """Return the boss about an axis, down into what it stands on [m]."""
+    side = [(BOSS_RADIUS, -1.0), (BOSS_RADIUS, BOSS_END - EDGE_BREAK)]
+    outline = [*side, (BOSS_RADIUS - EDGE_BREAK, BOSS_END)]
+    return convex_revolve(_mm(outline), BOSS_FACETS, center)
 
 
 def _can_surface() -> trimesh.Trimesh:
@@ -244,13 +249,13 @@ def plate_pieces() -> list[Piece]:
     The ring's underside is 0.1 mm above the plate's, so that the washers alone carry the face.
     """
     washer = Contact(lumped_head_friction())
-    pieces = [Piece("bore", _bore_ring(), Contact(FIT_FRICTION))]
+    pieces = [Piece("bore", bore_ring((0, SHAFT_Y * MM)), Contact(FIT_FRICTION))]
     for k, (x, y) in enumerate(bolt_xy()):
-        pieces.append(Piece(f"washer_{k}", _washer((x * MM, y * MM)), washer))
+        pieces.append(Piece(f"washer_{k}", washer_surface((x * MM, y * MM)), washer))
     return pieces + _plate_boxes()
 
 
-def _washer(center: tuple[float, float]) -> trimesh.Trimesh:
+def washer_surface(center: tuple[float, float]) -> trimesh.Trimesh:
     """Return what is felt around a bolt's hole [m]: under the head, on the seat, and the wall.
 
     The wall ends short of both faces: where they are pressed in by micrometres it would only cost.
@@ -270,13 +275,13 @@ def _washer(center: tuple[float, float]) -> trimesh.Trimesh:
 BORE_FELT_EDGES = 4
 
 
-def _bore_ring() -> trimesh.Trimesh:
-    """Return the wall of the bore [m]; rows of triangles are about as tall as wide."""
+def bore_ring(center: tuple[float, float]) -> trimesh.Trimesh:
+    """Return the wall of the bore about an axis [m]; rows of triangles are as tall as wide."""
     gap, outer, top = 0.1, 7.2, PLATE_THICKNESS
     wide = BORE_RADIUS + EDGE_BREAK
     inner = [(BORE_RADIUS, top - EDGE_BREAK), (BORE_RADIUS, top / 2), (BORE_RADIUS, EDGE_BREAK)]
     profile = [(wide, top), *inner, (wide - gap, gap), (outer, gap), (outer, top)]
-    ring = revolved_surface(_mm(profile), BORE_FACETS, center=(0, SHAFT_Y * MM))
+    ring = revolved_surface(_mm(profile), BORE_FACETS, center)
     felt = np.tile(np.repeat(np.arange(len(profile)) < BORE_FELT_EDGES, BORE_FACETS), 2)
     ring.update_faces(felt)
     return ring
@@ -320,7 +325,7 @@ def box_piece(
     return Piece(name, Box(*size), contact, RigidTransform(center))
 
 
-def _upright_cylinder(
+def upright_cylinder(
     name: str, radius: float, low: float, high: float, contact: Contact, hint: float, y: float = 0
 ) -> Piece:
     """Return an upright cylinder about (0, y) [mm] with a mesh hint [mm]."""

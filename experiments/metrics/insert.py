@@ -7,6 +7,7 @@ from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from cell.product import Fit, Product
+from experiments.metrics.bolts import standing
 from experiments.metrics.common import Measured, base_moved
 from experiments.record import Arrays, OperationRecord, logged_poses, rows_of
 from experiments.snapshot import Snapshot
@@ -27,7 +28,22 @@ def measure_insert(cell: Cell, record: OperationRecord, log: Arrays) -> Measured
         assert record.end is not None
         gap, tilt = seat_errors(cell.product, fit, record.end)
         measured |= {"gap_m": gap, "tilt_rad": tilt}
+        measured |= riders_standing(cell.product, record.operation.riders, record.end)
     return measured | base_moved(record)
+
+
+def riders_standing(product: Product, riders: tuple[str, ...], snapshot: Snapshot) -> Measured:
+    """Return how the bolts that rode in stand on the mouths of their threads, if those are there.
+
+    Judged like bolts that the hand has set.
+    """
+    measured: Measured = {}
+    for bolt in riders:
+        fastener = product.fasteners.get(bolt)
+        if fastener is not None:
+            stands = standing(fastener, snapshot.X_HF[bolt])
+            measured |= {f"{bolt}/{name}": value for name, value in stands.items()}
+    return measured
 
 
 def seat_errors(product: Product, fit: Fit, snapshot: Snapshot) -> tuple[float, float]:

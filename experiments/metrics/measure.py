@@ -10,14 +10,17 @@ from cell.builder import Cell
 from experiments.metrics.bolts import measure_bolts, measure_tighten
 from experiments.metrics.common import Measured, force_plate_peaks
 from experiments.metrics.insert import measure_insert
+from experiments.metrics.loose import measure_loose_bolts, measure_set_aside
 from experiments.metrics.place import measure_place
 from experiments.record import Arrays, OperationRecord, rows_between
 
 Measure = Callable[[Cell, OperationRecord, Arrays], Measured]
 _MEASURES: dict[str, Measure] = {
     "pick_place": measure_place,
+    "set_aside": measure_set_aside,
     "insert_shaft": measure_insert,
     "place_bolts": measure_bolts,
+    "place_loose_bolts": measure_loose_bolts,
     "tighten_bolts": measure_tighten,
 }
 

@@ -95,15 +95,26 @@ def gripped(sensed: Sensed) -> bool:
     return sensed.time >= GRIP_TIME and abs(sensed.jaw_rate) < 1e-3
 
 
-def take(station: Station, part: str, reach: Reach, lift: float) -> Iterator[Phase]:
+def take(
+    station: Station, part: str, reach: Reach, height: float, riders: tuple[str, ...] = ()
+) -> Iterator[Phase]:
     """Yield the phases that fetch a part: approach, descend, grip, lift.
 
     Args:
         station: The planner's view of the cell.
         part: Name of the part.
         reach: How to grasp it.
-        lift: How far straight up [m].
+        height: How far straight up [m].
+        riders: Names of the parts that lie loose on it and come along.
     """
+    yield from seize(station, part, reach, riders)
+    yield from lift(station, part, reach, height)
+
+
+def seize(
+    station: Station, part: str, reach: Reach, riders: tuple[str, ...] = ()
+) -> Iterator[Phase]:
+    """Yield the phases after which a part is in the hand, where it stands."""
     frame = station.arm("left").frame(reach.grasp.jaw)
     yield Phase(
         f"{part}: approach",
@@ -119,16 +130,23 @@ def take(station: Station, part: str, reach: Reach, lift: float) -> Iterator[Pha
         left=station.line("left", frame, reach.X_WJaw, speed=HAND_SPEED),
     )
     yield from grip(station, part, reach.grasp)
-    X_WJaw = station.pose("left", reach.grasp.jaw)
-    up = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() + [0.0, 0.0, lift])
-    station.held = part
+    station.held, station.riders = part, riders
+
+
+def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[Phase]:
+    """Yield the phase that takes the part in the hand straight up by a height [m]."""
+    X_WJaw, frame = (
+        station.pose("left", reach.grasp.jaw),
+        station.arm("left").frame(reach.grasp.jaw),
+    )
+    up = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() + [0.0, 0.0, height])
     yield Phase(
         f"{part}: lift",
         motion_finished,
         timeout=10.0,
         left=station.line("left", frame, up, speed=HAND_SPEED),
         guard=lost_grasp(station.held_opening),
-        awake=frozenset([part]),
+        awake=frozenset([part, *station.riders]),
     )
 
 
@@ -157,7 +175,7 @@ def let_go(
     yield Phase(
         f"{part}: release", after(RELEASE_TIME), timeout=1.0, jaw=opened(grasp), awake=awake
     )
-    station.held = None
+    station.held, station.riders = None, ()
     X_WJaw, frame = station.pose("left", grasp.jaw), station.arm("left").frame(grasp.jaw)
     for name, distance, stay in (("clear", CLEAR, awake), ("retreat", retreat, frozenset())):
         goal = backed_off(X_WJaw, distance)

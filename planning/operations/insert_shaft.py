@@ -61,18 +61,22 @@ class Stalled:
         return sensed.time - self._since >= STALL_TIME
 
 
-def insert_shaft(station: Station, fit: Fit) -> Iterator[Phase]:
+def insert_shaft(station: Station, fit: Fit, riders: tuple[str, ...] = ()) -> Iterator[Phase]:
     """Yield the phases that put the part with the hole onto the shaft and let it go.
+
+    Bolts that ride in its holes reach beyond its underside: they come to stand on the mouths of
+    their threads, and their heads stay behind as the part sinks to its seat.
 
     Args:
         station: The planner's view of the cell.
         fit: Which shaft, which hole, and where they meet.
+        riders: Names of the parts that lie loose on the part with the hole.
     """
-    part, held = fit.hole, frozenset([fit.hole])
-    both = frozenset([fit.hole, fit.shaft])
+    part, held = fit.hole, frozenset([fit.hole, *riders])
+    both = held | {fit.shaft}
     X_WGoal = goal_pose(station, fit)
     reach = first(_useful(station, fit, X_WGoal), part, station)
-    yield from take(station, part, reach, LIFT)
+    yield from take(station, part, reach, LIFT, riders)
     jaw = station.arm("left").frame(reach.grasp.jaw)
     X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
     holding = lost_grasp(station.held_opening)
@@ -122,12 +126,12 @@ def _useful(station: Station, fit: Fit, X_WGoal: RigidTransform) -> Iterator[Rea
         may_touch = [("left_tool", part.name), ("held", "*")]
         if all(
             station.configurations("left", jaw, X, reach.q_before, may_touch) for X in goals
-        ) and _comes_along(X_WGoal, reach.grasp.X_PJaw):
+        ) and comes_from_above(X_WGoal, reach.grasp.X_PJaw):
             yield reach
 
 
-def _comes_along(X_WP: RigidTransform, X_PJaw: RigidTransform) -> bool:
-    """Return whether the hand points down the mating direction: it must not meet the target."""
+def comes_from_above(X_WP: RigidTransform, X_PJaw: RigidTransform) -> bool:
+    """Return whether the hand points down at the part: it must not meet what the part comes to."""
     return bool((X_WP @ X_PJaw).rotation().matrix()[2, 2] < -0.9)
 
 

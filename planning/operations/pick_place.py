@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 
+import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.events import evacuate_jig, inflate_jig, soften_jig
@@ -19,13 +20,15 @@ from planning.operations.grasping import (
     reachable_grasps,
     take,
 )
-from planning.operations.placement import Placement, choose_placement
+from planning.operations.placement import HOVER, RETREAT, Placement, choose_placement
 from planning.operations.station import Station
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
 PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M].
-DEEPEST = 0.025  # Pressing fails if the bed has not resisted by then [m] [A].
-RETREAT = 0.08
+# Pressing fails if the bed has not resisted this far below its apex [m] [A]: the plate's foot is
+# 15 mm deep before its face comes to lie on the bed.
+DEEPEST = 0.03
+HOVER_TIME, STOP_TIME = 0.1, 0.2  # [s] [A]
 JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
 SETTLE_TIME = 1.0
 
@@ -42,6 +45,7 @@ def pick_place(
         later: Names of the parts that will be mated with it: its yaw must suit them.
     """
     yield Phase(f"{part}: look", after(0.2), 1.0, start=(inflate_jig,), awake=frozenset([part]))
+    station.origins[part] = station.sense(part)
     reach, placement = _choose(station, part, up, later)
     yield from take(station, part, reach, LIFT)
     awake, holding = frozenset([part]), lost_grasp(station.held_opening)
@@ -58,16 +62,21 @@ def pick_place(
         guard=holding,
         awake=awake,
     )
-    deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, DEEPEST])
+    # The wrist is tared at rest: the braking arm feels 2 N of its own [M].
+    yield Phase(f"{part}: hover", after(HOVER_TIME), 1.0, guard=holding, awake=awake)
+    down = HOVER + DEEPEST
+    deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, down])
     yield Phase(
         f"{part}: press",
         pressed(station.config.placement.press_force),
-        timeout=DEEPEST / PRESS_SPEED,
+        timeout=1.0 + down / PRESS_SPEED,
         left=station.line("left", frame, deep, speed=PRESS_SPEED),
         guard=holding,
         start=(soften_jig(part),),
         awake=awake,
     )
+    # The hand comes to rest first: what moves then is not moved by the freezing.
+    yield Phase(f"{part}: stop", after(STOP_TIME), 1.0, guard=holding, awake=awake, tare=False)
     yield Phase(
         f"{part}: jam",
         jammed(station, JAM_TIME),
@@ -94,13 +103,18 @@ def _choose(
 
 
 def _top_first(station: Station, part: str, X_WP: RigidTransform) -> Iterator[Reach]:
-    """Yield reachable grasps, those that come from above first."""
+    """Yield reachable grasps: from above first, of these the one nearest to the mass centre.
 
-    def level(grasp: Grasp) -> float:
-        return float((X_WP @ grasp.X_PJaw).rotation().matrix()[2, 2])
+    What is pressed off the middle of its pads turns in the grip.
+    """
+    p_PCom = station.part(part).mesh.center_mass
 
-    grasps = sorted(station.part(part).grasps, key=level)
-    return reachable_grasps(station, part, X_WP, grasps)
+    def rank(grasp: Grasp) -> tuple[float, float]:
+        X_WJaw = X_WP @ grasp.X_PJaw
+        away = X_WJaw.translation() - X_WP @ p_PCom
+        return round(X_WJaw.rotation().matrix()[2, 2], 2), float(np.hypot(away[0], away[1]))
+
+    return reachable_grasps(station, part, X_WP, sorted(station.part(part).grasps, key=rank))
 
 
 def pressed(force: float) -> Condition:

@@ -1,6 +1,7 @@
 """Operation place_bolts: bolts from the tray into their holes.
 
-The left hand sets each bolt upright into its hole, where it stands on the mouth of the thread.
+The left hand sets each bolt upright into its hole, where it stands on the mouth of the thread. If
+the part with the thread is not there yet, the bolt hangs by its head, or stands on the bed below.
 """
 
 from __future__ import annotations
@@ -12,6 +13,7 @@ from pydrake.math import RigidTransform
 
 from cell.phase import Phase, after, motion_finished
 from planning.operations.grasping import (
+    HAND_SPEED,
     Reach,
     let_go,
     lost_grasp,
@@ -23,7 +25,8 @@ from planning.operations.insert_shaft import raised
 from planning.operations.station import FINE_CLEARANCE, Station
 
 LIFT = 0.06
-ABOVE = 0.012  # A bolt hovers this far above where it will stand: its tip is over the hole [m] [A].
+CLEAR_ABOVE = 0.045  # Transfers end this far above where the bolt will stand [m] [A].
+ABOVE = 0.012  # The bolt is measured once more this far above, its tip over the hole [m] [A].
 ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
 TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
 SLOW = 0.02  # [m/s] [A]
@@ -41,56 +44,77 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     reach = _grasp_for_hole(station, bolt)
     yield from take(station, bolt, reach, LIFT)
     jaw = station.arm("left").frame(reach.grasp.jaw)
-    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(bolt)
-    X_WStand = standing_pose(station, bolt)
+    # Heights are those of a bolt that stands on the mouth of its thread.
+    X_WMouth, X_WStand = mouth_pose(station, bolt), standing_pose(station, bolt)
     holding, held = lost_grasp(station.held_opening), frozenset([bolt])
-    above = raised(X_WStand, ABOVE) @ X_JawP.inverse()
-    may_touch = [("held", "*")]
-    q_above = station.configuration(
-        "left", jaw, above, reach.q_before, may_touch, clearance=FINE_CLEARANCE
+
+    def at(X_WP: RigidTransform) -> RigidTransform:
+        X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(bolt)
+        return X_WP @ X_JawP.inverse()
+
+    above = station.configuration(
+        "left", jaw, at(raised(X_WMouth, CLEAR_ABOVE)), reach.q_before, [("left_tool", bolt)]
     )
     yield Phase(
         f"{bolt}: transfer",
         motion_finished,
         timeout=20.0,
-        left=station.move("left", q_above, may_touch, clearance=FINE_CLEARANCE),
+        left=station.move("left", above),
         guard=holding,
         awake=held,
     )
-    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(bolt)
-    yield Phase(
-        f"{bolt}: align",
-        motion_finished,
-        timeout=5.0,
-        left=station.line("left", jaw, raised(X_WStand, ENTRY) @ X_JawP.inverse(), speed=SLOW),
-        guard=holding,
-        awake=held,
-    )
+    for name, height, speed in (("come down", ABOVE, HAND_SPEED), ("align", ENTRY, SLOW)):
+        yield Phase(
+            f"{bolt}: {name}",
+            motion_finished,
+            timeout=5.0,
+            left=station.line("left", jaw, at(raised(X_WMouth, height)), speed=speed),
+            guard=holding,
+            awake=held,
+        )
     awake = held | _assembled(station, bolt)
     yield Phase(
         f"{bolt}: lower",
         lambda sensed: sensed.finished or sensed.wrench["left"][5] > TOUCH_FORCE,
         timeout=10.0,
-        left=station.line("left", jaw, raised(X_WStand, -2e-4) @ X_JawP.inverse(), speed=SLOW),
+        left=station.line("left", jaw, at(raised(X_WStand, -2e-4)), speed=SLOW),
         guard=holding,
         awake=awake,
     )
     yield from let_go(station, bolt, reach.grasp, RETREAT, awake)
 
 
-def standing_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return X_WP of a bolt that stands on the mouth of its thread, from the sensed parts."""
+def seated_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP of a bolt whose head rests on what it clamps, from the sensed parts.
+
+    It is derived from the part that carries the thread, once that is on the jig.
+    """
     fastener = station.cell.product.fasteners[bolt]
-    into = station.part(fastener.into)
-    X_WA = station.sense(fastener.into) @ into.X_AP.inverse()
-    out = RigidTransform([0.0, 0.0, fastener.thread_depth])
-    return X_WA @ station.part(bolt).X_AP @ out
+    name = fastener.into if fastener.into in station.fixed else fastener.clamps
+    X_WA = station.sense(name) @ station.part(name).X_AP.inverse()
+    return X_WA @ station.part(bolt).X_AP
+
+
+def mouth_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP of a bolt that stands on the mouth of its thread, be it there or not."""
+    out = RigidTransform([0.0, 0.0, station.cell.product.fasteners[bolt].thread_depth])
+    return seated_pose(station, bolt) @ out
+
+
+def standing_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP at which a bolt will stand: on its thread, or by its head where there is none.
+
+    Something else below the hole, such as the bed, may stop a bolt without a thread before.
+    """
+    if station.cell.product.fasteners[bolt].into in station.fixed:
+        return mouth_pose(station, bolt)
+    return seated_pose(station, bolt)
 
 
 def _assembled(station: Station, bolt: str) -> frozenset[str]:
-    """Return the parts that a bolt at its hole can touch."""
+    """Return the parts on the jig that a bolt at its hole can touch."""
     fastener = station.cell.product.fasteners[bolt]
-    return frozenset([fastener.into, fastener.clamps])
+    return frozenset([fastener.into, fastener.clamps]) & frozenset(station.fixed)
 
 
 def _grasp_for_hole(station: Station, bolt: str) -> Reach:

@@ -12,11 +12,13 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from planning.motion.kinematics import Unreachable
-from planning.operations.grasping import Reach
+from planning.motion.kinematics import Unreachable, ik_solutions
+from planning.motion.paths import NoPath, plan_line
+from planning.operations.grasping import Reach, backed_off
 from planning.operations.station import Station
 
 YAWS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
+RETREAT = 0.08  # The hand backs off this far when it has let go [m] [A].
 HOVER = 0.008  # The part waits this far above the bag before it is pressed in [m] [A].
 # Depth at which later grasps are checked; 20 N press the motor in by 5 to 10 mm [M].
 LIKELY_DEPTH = 0.007
@@ -84,7 +86,8 @@ def choose_placement(
     for yaw, X_WP, q in _placeable(station, part, up, reach, apex + HOVER):
         seated = pose_on_jig(station, part, up, yaw, apex - LIKELY_DEPTH)
         X_WA = seated @ station.part(part).X_AP.inverse()
-        if all(_mates(station, name, X_WA) for name in later):
+        leaves = _leaves(station, reach, seated @ reach.grasp.X_PJaw, q)
+        if leaves and all(_mates(station, name, X_WA) for name in later):
             return Placement(yaw, X_WP, q)
     goal = pose_on_jig(station, part, up, 0.0, apex + HOVER)
     raise Unreachable("left", reach.grasp.jaw, goal @ reach.grasp.X_PJaw, f"no yaw suits '{part}'")
@@ -103,6 +106,19 @@ def _placeable(
             found.append((float(np.max(np.abs(q - reach.q_before))), yaw, X_WP, q))
     for _, yaw, X_WP, q in sorted(found, key=lambda item: item[0]):
         yield yaw, X_WP, q
+
+
+def _leaves(station: Station, reach: Reach, X_WJaw: RigidTransform, q: np.ndarray) -> bool:
+    """Return whether the hand can back off straight from a jaw pose, with joints near ``q``."""
+    arm, context = station.arm("left"), station.context
+    frame = arm.frame(reach.grasp.jaw)
+    try:
+        for q_at in ik_solutions(arm, context, frame, X_WJaw, q)[:1]:
+            plan_line(arm, context, frame, q_at, backed_off(X_WJaw, RETREAT))
+            return True
+    except (Unreachable, NoPath):
+        pass
+    return False
 
 
 def _mates(station: Station, part: str, X_WA: RigidTransform) -> bool:

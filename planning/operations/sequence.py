@@ -1,22 +1,19 @@
-"""From a fixing plan to operations: which of them, on which parts, in which order."""
+"""From a fixing plan to operations: which of them, on which parts, in which order.
+
+Nothing here knows a product. The jig holds the part that the plan says; when the plan names another
+one, what stands on the jig is set aside as a whole, and brought back to the new one. Bolts whose
+thread is not there yet are put loose into the holes of the part that they will clamp; they ride
+along with it and are tightened as soon as their thread is.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from cell.errors import CellError
-from cell.phase import Outcome, Phase, after
 from cell.product import Fit, Product
+from planning.fixing.algorithm import FixingStep
 from planning.fixing.planner import FixingPlan
-from planning.operations.counter_hold import hold, park, release_hold
-from planning.operations.insert_shaft import insert_shaft
-from planning.operations.pick_place import pick_place
-from planning.operations.place_bolts import place_bolt
-from planning.operations.station import Station
-from planning.operations.tighten_bolts import star_order, tighten_bolt
-
-REST_TIME = 0.2  # [s] [A]
 
 
 class NoOperation(CellError):
@@ -29,102 +26,120 @@ class Operation:
 
     Attributes:
         name: For example "insert plate".
-        kind: "pick_place", "insert_shaft", "place_bolts" or "tighten_bolts".
+        kind: "pick_place", "set_aside", "insert_shaft", "place_bolts", "place_loose_bolts" or
+            "tighten_bolts".
         parts: What it moves.
         fit: Of "insert_shaft": which shaft, which hole.
+        riders: Parts that lie loose on what it moves, and come along.
     """
 
     name: str
     kind: str
     parts: tuple[str, ...]
     fit: Fit | None = None
+    riders: tuple[str, ...] = ()
 
 
 def operations(product: Product, plan: FixingPlan) -> list[Operation]:
     """Return the operations that carry out a feasible plan, in order.
 
     Raises:
-        NoOperation: A step that is neither a fit nor fastening, or that fixes another part than the
-            first step does.
+        NoOperation: A step that is neither a fit nor fastening, or something other than a part
+            that is to be fixed on the jig.
     """
-    base = plan.steps[0].fixed_part
-    if any(step.fixed_part != base for step in plan.steps):
-        raise NoOperation(
-            f"The plan fixes {', '.join(step.fixed_part for step in plan.steps)} in turn; "
-            f"the operations can keep one part on the jig only. Another order may do."
-        )
-    result = [Operation(f"place {base}", "pick_place", (base,))]
+    schedule = _Schedule(product)
     for step in plan.steps:
-        result += _mating(product, step.incoming, step.target)
-    return result
+        schedule.add(step)
+    return schedule.result
 
 
-def _mating(
-    product: Product, incoming: tuple[str, ...], target: tuple[str, ...]
-) -> list[Operation]:
-    if all(name in product.fasteners for name in incoming):
-        return [
-            Operation("place bolts", "place_bolts", incoming),
-            Operation("tighten bolts", "tighten_bolts", incoming),
-        ]
-    found = []
-    for name in incoming:
-        fits = [fit for fit in product.fits if fit.hole == name and fit.shaft in target]
-        if not fits:
+def fixed_after(product: Product, fixed: tuple[str, ...], operation: Operation) -> tuple[str, ...]:
+    """Return what the jig holds, bolts apart, after an operation; ``fixed``: before it."""
+    if operation.kind == "pick_place":
+        return operation.parts
+    if operation.kind == "set_aside":
+        return ()
+    if operation.kind == "insert_shaft":
+        riders = [name for name in operation.riders if name not in product.fasteners]
+        return (*fixed, *operation.parts, *riders)
+    return fixed
+
+
+@dataclass
+class _Schedule:
+    """The operations so far, and what the jig holds after them.
+
+    Attributes:
+        product: Fits and fasteners.
+        result: The operations.
+        on_jig: What stands on the jig, the part that it holds first.
+        loose: Bolts that are not tightened yet.
+    """
+
+    product: Product
+    result: list[Operation] = field(default_factory=list)
+    on_jig: tuple[str, ...] = ()
+    loose: tuple[str, ...] = ()
+
+    def add(self, step: FixingStep) -> None:
+        """Add the operations of one step of the plan."""
+        if not self.on_jig:
+            # Nothing is assembled yet: whatever is not fixed is brought.
+            self._fix(step.fixed_part)
+            both = (*step.target, *step.incoming)
+            self._bring(tuple(name for name in both if name != step.fixed_part))
+        elif step.fixed_part != self.on_jig[0]:
+            moved, riders = self.on_jig[0], self.on_jig[1:]
+            self.result.append(Operation(f"set aside {moved}", "set_aside", (moved,), None, riders))
+            self._fix(step.fixed_part)
+            self._insert(moved, riders)
+        else:
+            self._bring(step.incoming)
+        self._tighten()
+
+    def _fix(self, part: str) -> None:
+        if part not in self.product.parts:
+            raise NoOperation(f"The plan fixes '{part}': the jig can hold a part, not a group.")
+        self.result.append(Operation(f"place {part}", "pick_place", (part,)))
+        self.on_jig = (part,)
+
+    def _bring(self, incoming: tuple[str, ...]) -> None:
+        if all(name in self.product.fasteners for name in incoming):
+            self._place_bolts(incoming)
+        else:
+            for name in incoming:
+                self._insert(name)
+
+    def _insert(self, part: str, riders: tuple[str, ...] = ()) -> None:
+        fits = self.product.fits
+        found = [fit for fit in fits if fit.hole == part and fit.shaft in self.on_jig]
+        if not found:
             raise NoOperation(
-                f"No operation brings '{name}' to {', '.join(target)}: it is neither a fastener "
-                f"nor the hole of a fit. Fits: {', '.join(f.hole for f in product.fits) or 'none'}."
+                f"No operation brings '{part}' to {', '.join(self.on_jig)}: it is neither a "
+                f"fastener nor the hole of a fit. "
+                f"Fits: {', '.join(fit.hole for fit in fits) or 'none'}."
             )
-        found.append(Operation(f"insert {name}", "insert_shaft", (name,), fits[0]))
-    return found
+        name = f"insert {part}"
+        self.result.append(Operation(name, "insert_shaft", (part,), found[0], riders))
+        self.on_jig += (part, *riders)
 
+    def _place_bolts(self, bolts: tuple[str, ...]) -> None:
+        fasteners = [self.product.fasteners[bolt] for bolt in bolts]
+        for fastener in fasteners:
+            if fastener.clamps not in self.on_jig:
+                raise NoOperation(
+                    f"No operation brings '{fastener.part}' to {', '.join(self.on_jig)}: what it "
+                    f"clamps, '{fastener.clamps}', is not there yet."
+                )
+        threads = all(fastener.into in self.on_jig for fastener in fasteners)
+        kind = "place_bolts" if threads else "place_loose_bolts"
+        self.result.append(Operation("place bolts", kind, bolts))
+        self.on_jig += bolts
+        self.loose += bolts
 
-def phases(station: Station, operation: Operation) -> Iterator[Phase]:
-    """Yield the phases of one operation, each built from what is sensed then."""
-    return _PHASES[operation.kind](station, operation)
-
-
-def _pick_place(station: Station, operation: Operation) -> Iterator[Phase]:
-    product = station.cell.product
-    (part,) = operation.parts
-    later = tuple(fit.hole for fit in product.fits if fit.shaft == part)
-    yield from pick_place(station, part, product.up, later)
-    station.fixed = (part,)
-
-
-def _insert_shaft(station: Station, operation: Operation) -> Iterator[Phase]:
-    assert operation.fit is not None
-    yield from insert_shaft(station, operation.fit)
-    station.fixed = (*station.fixed, operation.fit.hole)
-
-
-def _place_bolts(station: Station, operation: Operation) -> Iterator[Phase]:
-    for bolt in operation.parts:
-        yield from place_bolt(station, bolt)
-
-
-def _tighten_bolts(station: Station, operation: Operation) -> Generator[Phase, Outcome, None]:
-    clamped = station.cell.product.fasteners[operation.parts[0]].clamps
-    assembly = frozenset([*station.fixed, *operation.parts])
-    if station.config.driver.counter_hold:
-        grasp = yield from hold(station, clamped)
-        yield from _drive(station, operation.parts)
-        yield from release_hold(station, clamped, grasp, assembly)
-    else:
-        yield from park(station)
-        yield from _drive(station, operation.parts)
-    # Nothing holds the assembly now but the jig: what it measures here is what the user gets.
-    yield Phase("assembly: rest", after(REST_TIME), timeout=1.0, awake=assembly)
-
-
-def _drive(station: Station, bolts: tuple[str, ...]) -> Iterator[Phase]:
-    for bolt in star_order(station, bolts):
-        yield from tighten_bolt(station, bolt)
-
-
-_PHASES = {
-    "pick_place": _pick_place,
-    "insert_shaft": _insert_shaft,
-    "place_bolts": _place_bolts,
-    "tighten_bolts": _tighten_bolts,
-}
+    def _tighten(self) -> None:
+        fasteners = self.product.fasteners
+        ready = tuple(bolt for bolt in self.loose if fasteners[bolt].into in self.on_jig)
+        if ready:
+            self.result.append(Operation("tighten bolts", "tighten_bolts", ready))
+            self.loose = tuple(bolt for bolt in self.loose if bolt not in ready)

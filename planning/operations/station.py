@@ -70,10 +70,12 @@ class Station:
         context: Plant context, only read: joint angles of arms and tools.
         sense: Returns the sensed pose X_WP of a part.
         seed: Seeds every sampling planner, together with the number of the call.
-    nominal: What the planner believes the cell to be; None: exactly as it was built.
+        nominal: What the planner believes the cell to be; None: exactly as it was built.
         model: The planning copy.
         held: Name of the part in the left hand; None when it is empty.
+        riders: Names of the parts that lie loose on the one in the hand.
         fixed: Names of the parts that the jig holds, with what has been mated to them.
+        origins: By name of a part, the sensed pose X_WP from which it was taken to the jig.
         held_opening: Opening of the tip pads when it was gripped [m].
     """
 
@@ -84,7 +86,9 @@ class Station:
     nominal: CellConfig | None = None
     model: CollisionModel = field(init=False)
     held: str | None = None
+    riders: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
+    origins: dict[str, RigidTransform] = field(default_factory=dict)
     held_opening: float = 0.0
     _calls: int = 0
 
@@ -104,6 +108,11 @@ class Station:
         """Return an arm."""
         return self.cell.arms[name]
 
+    @property
+    def in_hand(self) -> tuple[str, ...]:
+        """Names of the part in the left hand and of what rides on it."""
+        return () if self.held is None else (self.held, *self.riders)
+
     def pose(self, arm: str, frame: str) -> RigidTransform:
         """Return the pose of a tool frame as it is now."""
         return self.arm(arm).frame(frame).CalcPoseInWorld(self.context)
@@ -114,13 +123,12 @@ class Station:
         """Return everything as it is sensed now."""
         plant, cell = self.cell.plant, self.cell
         names = [part.part.name for part in cell.parts]
-        X_WHand = self.pose("left", "tip")
-        held = {} if self.held is None else {self.held: X_WHand.inverse() @ self.sense(self.held)}
+        X_HandW = self.pose("left", "tip").inverse()
         return Surroundings(
             arms={arm.name: arm.positions(self.context) for arm in cell.arms.values()},
             tools={"left_tool": plant.GetPositions(self.context, cell.left.tool)},
-            X_WP={name: self.sense(name) for name in names if name != self.held},
-            X_HandP=held,
+            X_WP={name: self.sense(name) for name in names if name not in self.in_hand},
+            X_HandP={name: X_HandW @ self.sense(name) for name in self.in_hand},
             may_touch=tuple(may_touch),
             obstacle_clearance=clearance,
         )
@@ -222,8 +230,8 @@ class Station:
             return None
         plant = self.cell.plant
         flange = plant.GetFrameByName("flange", self.cell.left.instance)
-        body = self.cell.parts[self.held].body
-        return plant.CalcSpatialInertia(self.context, flange, [body.index()])
+        bodies = [self.cell.parts[name].body.index() for name in self.in_hand]
+        return plant.CalcSpatialInertia(self.context, flange, bodies)
 
 
 def is_regular(q: np.ndarray) -> bool:
