@@ -12,7 +12,7 @@ from experiments.cli import main
 from experiments.place_push import run_experiment
 from experiments.postures import POSTURES, PUSHES
 from experiments.regress import SUITES, TOLERANCES, drifts
-from experiments.rig_trial import Trial
+from experiments.trial import Trial
 
 
 def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture) -> str:
@@ -47,7 +47,7 @@ def test_bad_input_is_one_line_and_writes_nothing(
 
 def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:
     """The motor on a rigid plate: a verdict with figures, exit code 1, and a whole report."""
-    experiment = Experiment("place", CellConfig(), "rigid", 1, 0, tmp_path, quiet=True)
+    experiment = Experiment("place", CellConfig(), "rig", "rigid", 1, 0, tmp_path, quiet=True)
     assert run_experiment(experiment, "motor/P2") == 1
     result = json.loads((tmp_path / "result.json").read_text())
     (case,) = result["cases"]

@@ -19,19 +19,23 @@ from planning.operations.grasping import (
     reachable_grasps,
     take,
 )
-from planning.operations.placement import Placement, choose_placement
+from planning.operations.placement import HOVER, Placement, Suits, anywhere, choose_placement
 from planning.operations.station import Station
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
 PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M].
-DEEPEST = 0.025  # Pressing fails if the bed has not resisted by then [m] [A].
+DEEPEST = 0.025  # Below the bag's top: pressing fails if the bed has not resisted by then [m] [A].
 RETREAT = 0.08
 JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
 SETTLE_TIME = 1.0
 
 
 def pick_place(
-    station: Station, part: str, up: str, later: tuple[str, ...] = ()
+    station: Station,
+    part: str,
+    up: str,
+    later: tuple[str, ...] = (),
+    suits: Suits = anywhere,
 ) -> Iterator[Phase]:
     """Yield the phases that fix a part on the jig.
 
@@ -40,9 +44,10 @@ def pick_place(
         part: Name of the part.
         up: Axis of the product frame that shall point up.
         later: Names of the parts that will be mated with it: its yaw must suit them.
+        suits: Whether its pose on the jig suits whatever else comes later.
     """
     yield Phase(f"{part}: look", after(0.2), 1.0, start=(inflate_jig,), awake=frozenset([part]))
-    reach, placement = _choose(station, part, up, later)
+    reach, placement = _choose(station, part, up, later, suits)
     yield from take(station, part, reach, LIFT)
     awake, holding = frozenset([part]), lost_grasp(station.held_opening)
     frame = station.arm("left").frame(reach.grasp.jaw)
@@ -58,11 +63,12 @@ def pick_place(
         guard=holding,
         awake=awake,
     )
-    deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, DEEPEST])
+    way = HOVER + DEEPEST
+    deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, way])
     yield Phase(
         f"{part}: press",
         pressed(station.config.placement.press_force),
-        timeout=DEEPEST / PRESS_SPEED,
+        timeout=way / PRESS_SPEED,
         left=station.line("left", frame, deep, speed=PRESS_SPEED),
         guard=holding,
         start=(soften_jig(part),),
@@ -81,13 +87,13 @@ def pick_place(
 
 
 def _choose(
-    station: Station, part: str, up: str, later: tuple[str, ...]
+    station: Station, part: str, up: str, later: tuple[str, ...], suits: Suits
 ) -> tuple[Reach, Placement]:
     """Return the first grasp with a placement, grasps from above first."""
     failure = None
     for reach in _top_first(station, part, station.sense(part)):
         try:
-            return reach, choose_placement(station, part, up, reach, later)
+            return reach, choose_placement(station, part, up, reach, later, suits)
         except Unreachable as error:
             failure = error
     raise failure or no_grasp(station, part)
@@ -109,9 +115,14 @@ def pressed(force: float) -> Condition:
 
 
 def jammed(station: Station, least: float) -> Condition:
-    """End condition: the jig is frozen and the pump has run for ``least`` [s]."""
+    """End condition: the jig is frozen and the pump has run for ``least`` [s].
+
+    With no vacuum at all there is nothing to freeze.
+    """
+    jig = station.cell.soft_jig
 
     def condition(sensed: Sensed) -> bool:
-        return sensed.time >= least and station.cell.soft_jig.state is JigState.JAMMED
+        frozen = jig.state is JigState.JAMMED or jig.params.vacuum.pressure == 0
+        return sensed.time >= least and frozen
 
     return condition
