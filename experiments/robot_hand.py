@@ -1,13 +1,13 @@
 """The left arm's hand in a trial: it picks the part from the tray and brings it to the jig.
 
 The disturbances are those of the rig, come by as a robot would: the part is not quite where the
-camera says, so that it sits wrong in the grasp by that much; the jig is not quite where it was set
-down. Neither is known to the planner.
+look at the tray says, so that it sits wrong in the grasp, by what the jaws do not straighten, and
+is not looked at again before it is placed; the jig is not quite where it was set down.
 """
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator
 from dataclasses import dataclass, replace
 from typing import cast
 
@@ -67,17 +67,26 @@ class RobotBench:
         cell = build_cell(config, presented(product, posture))
         return RobotBench(cell, _stage(cell, posture.part), posture, push)
 
+    def _sensor(
+        self, simulation: Simulation, station: Station, disturbance: Disturbance
+    ) -> Callable[[str], RigidTransform]:
+        """Return what the planner takes for the pose of the part."""
+        grasp, X_DrawnP = self.posture.grasp, disturbance.X_PDrawn.inverse()
+
+        def sense(part: str) -> RigidTransform:
+            if station.held is not None:
+                return station.pose("left", grasp.jaw) @ grasp.X_PJaw.inverse()
+            return simulation.sense(part) @ X_DrawnP
+
+        return sense
+
     def begin(self, disturbance: Disturbance) -> RobotHand:
         """Put part and jig in their places, the arms at home."""
         simulation = Simulation(self.cell, disturbance.seed)
         X_WJ = disturbance.displaced(self.cell.X_WJ)
         self.cell.jig_base.reset(simulation.root, X_WJ)
-        X_DrawnP, name = disturbance.X_PDrawn.inverse(), self.posture.part
-
-        def sense(_: str) -> RigidTransform:
-            return simulation.sense(name) @ X_DrawnP
-
-        station = Station(self.cell, simulation.context, sense, disturbance.seed)
+        station = Station(self.cell, simulation.context, simulation.sense, seed=disturbance.seed)
+        station.sense = self._sensor(simulation, station, disturbance)
         return RobotHand(self, simulation, station, Observer(self.stage, simulation.root))
 
 
@@ -101,6 +110,8 @@ class RobotHand:
     """The left arm's hand in one trial: see `experiments.trial.Hand`.
 
     Attributes:
+        simulation: Of the cell.
+        station: The planner's view of it.
         observer: Looks at part and jig, and records from the press on.
         planned: X_JP as aimed at, with the yaw that the planner chose.
     """
@@ -109,21 +120,22 @@ class RobotHand:
         self, bench: RobotBench, simulation: Simulation, station: Station, observer: Observer
     ) -> None:
         self.observer = observer
-        self._bench, self._simulation, self._station = bench, simulation, station
+        self.simulation, self.station = simulation, station
+        self._bench = bench
         self._name = bench.posture.part
-        suits = anywhere if bench.push is None else self._leaves_room
+        suits = anywhere if bench.push is None else self.leaves_room
         self._placing = _Pending(pick_place(station, self._name, bench.posture.up, suits=suits))
         self.planned = self._planned(0.0)
 
     @property
     def time(self) -> float:
         """Simulated time [s]."""
-        return self._simulation.time
+        return self.simulation.time
 
     @property
     def stepping_cpu(self) -> float:
         """CPU seconds spent stepping so far."""
-        return self._simulation.stepping_cpu
+        return self.simulation.stepping_cpu
 
     def press(self) -> None:
         """Fetch the part, press it into the bag and freeze it there."""
@@ -136,22 +148,22 @@ class RobotHand:
     def let_go(self) -> None:
         """Open the jaws and back off along the approach direction."""
         self._place(last="retreat")
-        self._station.fixed = (self._name,)
+        self.station.fixed = (self._name,)
 
     def approach(self, line: PushLine) -> None:
         """Come from above and behind, by a planned way."""
         self._run(Phase("approach", after(0.0), 1.0, start=(rest_jig,)))
-        for phase in _Pending(approach(self._station, self._name, line)):
+        for phase in _Pending(approach(self.station, self._name, line)):
             self._run(phase)
 
     def push(self, line: PushLine) -> None:
         """Push along the line."""
-        for phase in _Pending(push(self._station, self._name, line)):
+        for phase in _Pending(push(self.station, self._name, line)):
             self._run(phase)
 
     def wait(self, phase: str, seconds: float) -> None:
         """Hold still."""
-        awake = frozenset(self._station.fixed)
+        awake = frozenset(self.station.fixed)
         self._run(Phase(phase, after(seconds), seconds + 1.0, start=(wake_jig,), awake=awake))
 
     def _place(self, last: str) -> None:
@@ -172,7 +184,7 @@ class RobotHand:
         """Run one phase, recorded; what the bag cannot hold is a verdict on the trial."""
         self.observer.begin(phase.name, self.time)
         try:
-            return self._simulation.run_phase(replace(phase, every_step=self._record))
+            return self.simulation.run_phase(replace(phase, every_step=self._record))
         except CellError as error:
             raise self.observer.failure(str(error)) from error
 
@@ -186,12 +198,12 @@ class RobotHand:
         part = cell.product.parts[posture.part]
         return planned_pose(part, posture, RigidTransform(), height, yaw)
 
-    def _leaves_room(self, X_WP: RigidTransform) -> bool:
+    def leaves_room(self, X_WP: RigidTransform) -> bool:
         """Return whether the arm can push the part where it will stand."""
         bench = self._bench
         assert bench.push is not None
         line = push_line(bench.stage, bench.push, bench.cell.X_WJ, X_WP)
-        return can_push(self._station, self._name, line)
+        return can_push(self.station, self._name, line)
 
 
 class _Pending:
