@@ -28,6 +28,7 @@ DEEPEST = 0.025  # Below the bag's top: pressing fails if the bed has not resist
 RETREAT = 0.08
 JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
 SETTLE_TIME = 1.0
+STEADY_TIME = 0.1  # The arm's deceleration, 2 N at the wrist, dies out in 10 ms [M].
 
 
 def pick_place(
@@ -63,6 +64,8 @@ def pick_place(
         guard=holding,
         awake=awake,
     )
+    # The press is felt against the weight that hangs on the wrist once the arm is still.
+    yield Phase(f"{part}: steady", after(STEADY_TIME), timeout=1.0, guard=holding, awake=awake)
     way = HOVER + DEEPEST
     deep = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() - [0.0, 0.0, way])
     yield Phase(
