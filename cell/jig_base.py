@@ -83,13 +83,13 @@ class JigBase:
         return self.plant.EvalBodyPoseInWorld(context, self.body)
 
     def reset(self, root: Context, X_WJ: RigidTransform) -> None:
-        """Set a free base down, awake and at rest, in a Context that may be new.
+        """Set a free base down, awake and at rest, in a Context where nothing is known of it yet.
 
         Args:
             root: Context of the diagram.
             X_WJ: Where; a bolted base stays where it is.
         """
-        self._filter = None  # A new Context knows of no filter.
+        self._show(root)
         if self.free:
             context = self.plant.GetMyMutableContextFromRoot(root)
             self._joint.Unlock(context)
