@@ -17,6 +17,7 @@ from experiments.push_rule import leading, push_line
 from experiments.robot_hand import RobotBench, RobotHand
 from experiments.trial import Disturbance, run_trial
 from planning.motion.kinematics import tool_pose
+from planning.motion.timing import JointMotion
 from planning.operations.grasping import reachable_grasps
 from planning.operations.placement import YAWS, pose_on_jig
 from planning.operations.push import PushLine, can_push, push
@@ -79,6 +80,7 @@ def test_hand_follows_the_line_at_the_speed_of_the_stroke_and_stops_dead() -> No
     q = robot.station.configuration("left", frame, line.X_WT, arm.home, [("left_tool", "jig_base")])
     seen.stage.plant.SetPositions(seen.context, arm.instance, q)
     (phase,) = push(robot.station, "motor", line)
+    assert isinstance(phase.left, JointMotion)
     assert phase.left.duration == pytest.approx(line.stroke.duration)
     for t in (0.05, 0.2, line.stroke.duration):
         q, v = phase.left.at(t)
