@@ -24,7 +24,6 @@ from pydrake.systems.framework import Context
 from cell.config import CellConfig
 
 BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
-FLAT_HINT = 0.5  # Two flat faces: few large elements tell as much as many small ones [m] [A].
 
 
 @dataclass
@@ -166,12 +165,11 @@ def _inertia(config: CellConfig) -> SpatialInertia:
 def _set_sliding(
     plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, friction: float
 ) -> None:
-    """Set the friction between base and force plate, and mesh their flat contact coarsely."""
+    """Set the friction between base and force plate."""
     inspector = scene_graph.model_inspector()
     for geometry in plant.GetCollisionGeometriesForBody(body):
         properties = ProximityProperties(inspector.GetProximityProperties(geometry))
         material = CoulombFriction(friction, friction)
         properties.UpdateProperty("material", "coulomb_friction", material)
-        properties.UpdateProperty("hydroelastic", "resolution_hint", FLAT_HINT)
         source = plant.get_source_id()
         scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
