@@ -139,7 +139,7 @@ class RobotHand:
 
     def press(self) -> None:
         """Fetch the part, press it into the bag and freeze it there."""
-        self.wait("ready", READY_TIME)
+        self.wait("pick: ready", READY_TIME)
         self.observer.tare()
         self._place(last="jam")
         X_JP = self.observer.X_JP
