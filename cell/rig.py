@@ -46,9 +46,10 @@ from cell.soft_jig import SoftJig, SurfaceSamples
 from cell.stage import Stage
 from cell.tools import connect_gripper, set_gripper_gains
 
-# Drives of the carriage: stiffness, damping and largest effort [A], about those of a UR5e's hand:
-# slides [N/m, N s/m, N], turn and tilt [N m/rad, N m s/rad, N m].
-SLIDE_DRIVE = (2e5, 4e3, 200.0)
+# Drives of the carriage: stiffness, damping and largest effort; slides [N/m, N s/m, N], turn and
+# tilt [N m/rad, N m s/rad, N m]. Stiffness and damping are those of the left arm's hand at the jig,
+# from the drives of its joints: 37 to 49 kN/m, 3.3 to 5.0 kN m/rad [D]; the efforts are [A].
+SLIDE_DRIVE = (4.5e4, 1e3, 200.0)
 TURN_DRIVE = (5e3, 60.0, 30.0)
 LINK_MASS = 2.0  # Of each slide [kg] [A].
 CARRIAGE_JOINTS = ("x", "y", "z", "turn", "tilt")

@@ -36,6 +36,8 @@ def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture)
         (["push", "--set", "jig.vacuum.pressure=9e9"], "between 0"),
         (["push", "--set", "push.jig_mass=0.2"], "push.jig_mass"),
         (["place", "--set", "jig.bag.cap_height=0.005"], "wide"),
+        (["place", "--hand", "robot", "--bed", "rigid"], "--bed rigid is for --hand rig"),
+        (["push", "--hand", "foot"], "robot"),
         (["regress", "--suite", "huge"], "huge"),
     ],
 )

@@ -9,6 +9,7 @@ from pydrake.math import RigidTransform
 from cell import CellConfig, load_product
 from cell.errors import CellError
 from cell.phase import PhaseFailed
+from cell.rig import SLIDE_DRIVE, TURN_DRIVE
 from cell.stroke import Stroke
 from experiments.cases import Case, check_hand, judged
 from experiments.metrics.trial import tilt_between
@@ -90,6 +91,21 @@ def test_hand_follows_the_line_at_the_speed_of_the_stroke_and_stops_dead() -> No
         later = tool_pose(arm, seen.context, frame, q + 1e-4 * v)
         moved = (later.translation() - X_WT.translation()) / 1e-4
         assert moved == pytest.approx(speed * line.direction, abs=1e-3)
+
+
+def test_carriage_of_the_rig_is_as_stiff_as_the_arm() -> None:
+    """What makes the two hands agree: how far each gives way under a force at the jig."""
+    robot, chosen = hand("motor/P2", "motor/P2/a"), PUSHES["motor/P2/a"]
+    seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.left
+    X_WP = pose_on_jig(robot.station, "motor", "+z", np.pi, 0.04)
+    line = push_line(seen.stage, chosen, seen.X_WJ, X_WP)
+    near = [("left_tool", "jig_base")]
+    q = robot.station.configuration("left", arm.frame("tip"), line.X_WT, arm.home, near)
+    seen.stage.plant.SetPositions(seen.context, arm.instance, q)
+    jacobian = arm.jacobian(seen.context, arm.frame("tip"), np.zeros(3))
+    compliance = np.diag(jacobian / np.array(arm.config.stiffness) @ jacobian.T)
+    assert 1 / compliance[:3] == pytest.approx(TURN_DRIVE[0], rel=0.35)
+    assert 1 / compliance[3:] == pytest.approx(SLIDE_DRIVE[0], rel=0.2)
 
 
 def test_disturbances_are_those_of_the_rig() -> None:
