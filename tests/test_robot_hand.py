@@ -42,7 +42,7 @@ def test_part_lies_still_in_the_tray_within_the_arms_reach(posture: str) -> None
     robot = hand(posture)
     before = robot.observer.X_WP
     robot.observer.stage.part.wake(robot.observer.root)
-    for _ in range(300):
+    for _ in range(150):
         robot.simulation.step()
     after = robot.observer.X_WP
     assert np.linalg.norm(after.translation() - before.translation()) < 1.5e-3
