@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass, replace
 
 from pydrake.geometry import SceneGraph
@@ -13,6 +14,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.arm import Arm, Drive, add_arm
 from cell.config import CellConfig
+from cell.jig_base import JigBase
 from cell.parts import Parts, add_parts
 from cell.paths import model_url, new_parser
 from cell.product import Product
@@ -43,6 +45,7 @@ class Cell:
         left, right: The arms; the left one carries the gripper, the right one the driver.
         drives: Inputs of each arm, by arm name.
         gripper, driver: The tools.
+        jig_base: What the jig's bag sits on, bolted down or free on the force plate.
         soft_jig: The jig.
         parts: The loose parts.
         threads: By the name of the bolt.
@@ -60,6 +63,7 @@ class Cell:
     drives: Mapping[str, Drive]
     gripper: Gripper
     driver: Driver
+    jig_base: JigBase
     soft_jig: SoftJig
     parts: Parts
     threads: Mapping[str, Thread]
@@ -86,6 +90,7 @@ class Cell:
             root: Context of the diagram that the cell was built into.
         """
         self.parts.reset(root)
+        self.jig_base.reset(root, self.X_WJ)
         for thread in self.threads.values():
             thread.reset(root)
         for arm in self.arms.values():
@@ -109,14 +114,15 @@ def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> C
     with; the cell is needed for handles only.
     """
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
-    plate_weld, jig_base = add_workcell(plant, config, product)
+    plate_weld, base = add_workcell(plant, config, product)
+    jig_base = JigBase.prepare(plant, scene_graph, plate_weld, base, config)
     left, right = add_arms(plant, config)
     parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
     threads = add_threads(plant, scene_graph, product, parts, right)
-    soft_jig = SoftJig.add(plant, scene_graph, jig_base, config.jig)
-    soft_jig.filters_lifted = parts.filters_lifted
+    soft_jig = SoftJig.add(plant, scene_graph, base, config.jig)
+    soft_jig.filters_lifted = _filters_lifted(parts, jig_base)
     for thread in threads.values():
-        thread.filters_lifted = parts.filters_lifted
+        thread.filters_lifted = soft_jig.filters_lifted
     plant.Finalize()
     drives = {
         arm.name: Drive.connect(builder, plant, arm.instance, arm.home) for arm in (left, right)
@@ -135,12 +141,26 @@ def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> C
         drives=drives,
         gripper=gripper,
         driver=driver,
+        jig_base=jig_base,
         soft_jig=soft_jig,
         parts=parts,
         threads=threads,
         wrists=wrists,
         force_plate=force_plate,
     )
+
+
+def _filters_lifted(
+    parts: Parts, jig_base: JigBase
+) -> Callable[[Context], AbstractContextManager[None]]:
+    """Return what lifts the filters of everything that sleeps, given the root context."""
+
+    @contextmanager
+    def lifted(root: Context) -> Iterator[None]:
+        with parts.filters_lifted(root), jig_base.filters_lifted(root):
+            yield
+
+    return lifted
 
 
 def plant_config(config: CellConfig) -> MultibodyPlantConfig:

@@ -42,5 +42,17 @@ def release_from_jig(part: str) -> Event:
 
 
 def evacuate_jig(simulation: Simulation) -> None:
-    """Start the vacuum pump."""
-    simulation.cell.soft_jig.evacuate(simulation.root)
+    """Start the vacuum pump, unless the configured vacuum is none at all: the bag stays soft."""
+    jig = simulation.cell.soft_jig
+    if jig.params.vacuum.pressure > 0:
+        jig.evacuate(simulation.root)
+
+
+def rest_jig(simulation: Simulation) -> None:
+    """Let the jig's base sleep where it stands."""
+    simulation.cell.jig_base.sleep(simulation.root)
+
+
+def wake_jig(simulation: Simulation) -> None:
+    """Let the jig's base move again."""
+    simulation.cell.jig_base.wake(simulation.root)

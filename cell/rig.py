@@ -7,7 +7,7 @@ tilt. It stands in for an arm whose path is given: its drives follow stiffly up 
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 import trimesh
@@ -15,30 +15,21 @@ from pydrake.geometry import (
     AddCompliantHydroelasticProperties,
     AddContactMaterial,
     AddRigidHydroelasticProperties,
-    CollisionFilterDeclaration,
-    CollisionFilterManager,
     Convex,
     Cylinder,
-    FilterId,
     GeometryId,
-    GeometrySet,
     ProximityProperties,
-    RoleAssign,
-    SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
-    Joint,
     ModelInstanceIndex,
     PdControllerGains,
     PrismaticJoint,
     RevoluteJoint,
     RigidBody,
     SpatialInertia,
-    UnitInertia,
     WeldJoint,
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
@@ -46,21 +37,23 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cell.arm import Drive
 from cell.builder import JAW_REST, add_workcell, plant_config
 from cell.config import CellConfig
-from cell.parts import LoosePart, add_parts
+from cell.jig_base import JigBase
+from cell.parts import add_parts
 from cell.paths import model_url, new_parser
 from cell.product import Product
 from cell.sensors import WrenchSensor
 from cell.soft_jig import SoftJig, SurfaceSamples
-from cell.tools import Gripper, connect_gripper, set_gripper_gains
+from cell.stage import Stage
+from cell.tools import connect_gripper, set_gripper_gains
 
-# Drives of the carriage: stiffness, damping and largest effort [A], about those of a UR5e's hand:
-# slides [N/m, N s/m, N], turn and tilt [N m/rad, N m s/rad, N m].
-SLIDE_DRIVE = (2e5, 4e3, 200.0)
+# Drives of the carriage: stiffness, damping and largest effort; slides [N/m, N s/m, N], turn and
+# tilt [N m/rad, N m s/rad, N m]. Stiffness and damping are those of the left arm's hand at the jig,
+# from the drives of its joints: 37 to 49 kN/m, 3.3 to 5.0 kN m/rad [D]; the efforts are [A].
+SLIDE_DRIVE = (4.5e4, 1e3, 200.0)
 TURN_DRIVE = (5e3, 60.0, 30.0)
 LINK_MASS = 2.0  # Of each slide [kg] [A].
 CARRIAGE_JOINTS = ("x", "y", "z", "turn", "tilt")
 
-BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
 RIGID_FRICTION = 0.3  # Metal on metal [A].
 
 
@@ -100,38 +93,18 @@ class HandPose:
 
 
 @dataclass(frozen=True)
-class Rig:
+class Rig(Stage):
     """Handles to a built rig; holding it keeps everything alive that a simulation needs.
 
     Attributes:
-        config: What it was built from.
-        plant, scene_graph, diagram: Plain Drake.
-        jig_base: The base, free on the force plate.
-        soft_jig: The bag on it; None where a flat rigid block stands in its place.
-        part: The part to place.
-        samples: Its surface, as the bag feels it.
+        diagram: Plain Drake.
         drive: Targets of the carriage: x, y, z [m], turn, tilt [rad].
-        gripper: The hand's jaws.
-        hand: Frame T between the tip pads.
-        wrist: Wrench between carriage and hand.
-        force_plate: Wrench under the force plate.
-        asleep: The filter between jig and force plate while they sleep.
+        hand_length: From the carriage to T [m].
     """
 
-    config: CellConfig
-    plant: MultibodyPlant
-    scene_graph: SceneGraph
     diagram: Diagram
-    jig_base: RigidBody
-    soft_jig: SoftJig | None
-    part: LoosePart
-    samples: SurfaceSamples
     drive: Drive
-    gripper: Gripper
     hand_length: float
-    wrist: WrenchSensor
-    force_plate: WrenchSensor
-    asleep: list[FilterId] = field(default_factory=list)
 
     def joints(self, pose: HandPose) -> np.ndarray:
         """Return the carriage's joint positions (5,) for a hand pose."""
@@ -150,51 +123,16 @@ class Rig:
             q: (5,) where the carriage is.
         """
         context = self.plant.GetMyMutableContextFromRoot(root)
-        self.plant.SetFreeBodyPose(context, self.jig_base, X_WJ)
-        self.jig_base.SetSpatialInertiaInBodyFrame(context, _jig_inertia(self.config))
+        self.jig_base.reset(root, X_WJ)
         self.part.joint.SetPose(context, X_WP)
         self.part.joint.Lock(context)
         self.plant.SetPositions(context, self.drive.instance, q)
         self.drive.set_target(root, q, np.zeros(len(q)))
-        self.asleep.clear()  # A new Context knows of no filter.
-        self.part.sleep_filter = None
+        self.part.sleep_filter = None  # A new Context knows of no filter.
         if self.soft_jig is not None:
             for body in self.soft_jig.pressing:
                 self.soft_jig.release(body)
             self.soft_jig.inflate(root)
-
-    def sleep(self, root: Context) -> None:
-        """Put part and jig to sleep where they rest."""
-        context = self.plant.GetMyMutableContextFromRoot(root)
-        self.part.sleep(root)
-        self.plant.SetFreeBodySpatialVelocity(context, self.jig_base, SpatialVelocity.Zero())
-        self._jig_joint.Lock(context)
-        plate = self.force_plate.weld.child_body()
-        geometries = self.plant.GetCollisionGeometriesForBody
-        pair = GeometrySet(geometries(self.jig_base)), GeometrySet(geometries(plate))
-        apart = CollisionFilterDeclaration().ExcludeBetween(*pair)
-        self.asleep.append(self._filters(root).ApplyTransient(apart))
-
-    def wake(self, root: Context) -> None:
-        """Wake part and jig."""
-        for filter_id in self.asleep:
-            self._filters(root).RemoveDeclaration(filter_id)
-        self.asleep.clear()
-        self._jig_joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
-        self.part.wake(root)
-
-    @property
-    def _jig_joint(self) -> Joint:
-        (joint,) = [
-            joint
-            for joint in map(self.plant.get_joint, self.plant.GetJointIndices())
-            if joint.child_body().index() == self.jig_base.index()
-        ]
-        return joint
-
-    def _filters(self, root: Context) -> CollisionFilterManager:
-        context = self.scene_graph.GetMyMutableContextFromRoot(root)
-        return self.scene_graph.collision_filter_manager(context)
 
     def let_part_go(self, root: Context) -> None:
         """Take the stand away."""
@@ -214,15 +152,14 @@ def build_push_rig(config: CellConfig, product: Product, part: str, bed: str = "
     product = replace(product, parts={part: product.parts[part]}, tray=None)
     builder = DiagramBuilder()
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
-    plate_weld, jig_base = add_workcell(plant, config, product)
-    for body in (plate_weld.child_body(), jig_base):
-        _set_sliding(plant, scene_graph, body, config.push.base_friction)
+    plate_weld, base = add_workcell(plant, config, product)
+    jig_base = JigBase.prepare(plant, scene_graph, plate_weld, base, config)
     parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
     soft_jig = None
     if bed == "soft":
-        soft_jig = SoftJig.add(plant, scene_graph, jig_base, config.jig)
+        soft_jig = SoftJig.add(plant, scene_graph, base, config.jig)
     else:
-        _add_block(plant, jig_base, config)
+        _add_block(plant, base, config)
         _add_details(plant, parts[part].body, product.parts[part].mesh)
     wrist, hand = _add_carriage(plant)
     plant.Finalize()
@@ -274,33 +211,6 @@ def _add_carriage(plant: MultibodyPlant) -> tuple[WeldJoint, ModelInstanceIndex]
     plant.set_gravity_enabled(instance, False)
     plant.set_gravity_enabled(hand, False)
     return wrist, hand
-
-
-def _jig_inertia(config: CellConfig) -> SpatialInertia:
-    """Return base and beads about J: a disc below it and a ball of the same volume above."""
-    diameter, height = 0.160, 0.025  # Of the base [S], [A].
-    base = SpatialInertia.SolidCylinderWithMass(
-        config.push.jig_mass - BEAD_MASS, diameter / 2, height, np.array([0.0, 0.0, 1.0])
-    ).Shift(np.array([0.0, 0.0, height / 2]))
-    bag = config.jig.bag
-    radius = (0.75 * bag.volume / np.pi) ** (1 / 3)
-    p_JB = np.array([0.0, 0.0, 0.4 * bag.cap_height])  # Centroid of the cap, nearly [D].
-    unit = UnitInertia.SolidSphere(radius).ShiftFromCenterOfMass(-p_JB)
-    base += SpatialInertia(BEAD_MASS, p_JB, unit)
-    return base
-
-
-def _set_sliding(
-    plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, friction: float
-) -> None:
-    """Set the friction between base and force plate."""
-    inspector = scene_graph.model_inspector()
-    for geometry in plant.GetCollisionGeometriesForBody(body):
-        properties = ProximityProperties(inspector.GetProximityProperties(geometry))
-        material = CoulombFriction(friction, friction)
-        properties.UpdateProperty("material", "coulomb_friction", material)
-        source = plant.get_source_id()
-        scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
 
 
 def _add_block(plant: MultibodyPlant, jig_base: RigidBody, config: CellConfig) -> GeometryId:

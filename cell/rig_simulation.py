@@ -12,14 +12,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from cell.errors import CellError
-from cell.log import Log
-from cell.phase import PhaseFailed
 from cell.rig import HandPose, Rig
 from cell.soft_jig import JigState, SoftJig
-
-# A part this far below the top of the jig's base, or this far from its axis, has dropped off [m].
-DROPPED_BELOW, DROPPED_BESIDE = 0.02, 0.12
-RECORD_PERIOD = 2e-3  # [s] A force plate samples at 500 Hz or more [A].
+from cell.stage import Observer
+from cell.stroke import Stroke
 
 
 @dataclass(frozen=True)
@@ -51,21 +47,16 @@ def smooth_path(q0: np.ndarray, q1: np.ndarray, speed: float) -> Path:
 
 
 def stroke_path(q0: np.ndarray, q1: np.ndarray, speed: float, acceleration: float) -> Path:
-    """Return the straight path that speeds up evenly and stops dead at its end."""
+    """Return the straight path of a push: speeding up evenly, with a dead stop at its end."""
     way = float(np.linalg.norm((q1 - q0)[:3]))
     direction = (q1 - q0) / way
-    ramp = min(speed / acceleration, np.sqrt(2 * way / acceleration))
-    top = acceleration * ramp
-    duration = ramp + (way - top * ramp / 2) / top
+    stroke = Stroke(way, speed, acceleration)
 
     def at(t: float) -> tuple[np.ndarray, np.ndarray]:
-        if t >= duration:
-            return q1, np.zeros_like(q1)
-        fast = min(t, ramp)
-        s = acceleration * fast**2 / 2 + top * max(t - ramp, 0.0)
-        return q0 + s * direction, acceleration * fast * direction
+        distance, rate = stroke.at(t)
+        return q0 + distance * direction, rate * direction
 
-    return Path(at, duration)
+    return Path(at, stroke.duration)
 
 
 class RigSimulation:
@@ -79,8 +70,7 @@ class RigSimulation:
 
     Attributes:
         root: Context of the diagram.
-        context: Context of the plant.
-        log: Every `RECORD_PERIOD`: poses, and wrenches less their reading at `tare`.
+        observer: Records it.
         stepping_cpu: CPU seconds spent stepping so far.
     """
 
@@ -90,18 +80,13 @@ class RigSimulation:
         self.rig = rig
         self.simulator = Simulator(rig.diagram)
         self.root: Context = self.simulator.get_mutable_context()
-        self.context = rig.plant.GetMyMutableContextFromRoot(self.root)
-        self.log = Log()
+        self.observer = Observer(rig, self.root)
         self.stepping_cpu = 0.0
         self.steps = 0
         self.pose = pose
         self._bed_pushes = False
-        self._recording = False
-        self._record_every = max(1, round(RECORD_PERIOD / self.time_step))
         rig.reset(self.root, X_WJ, X_WP, rig.joints(pose))
         self.simulator.Initialize()
-        self._tare = np.zeros(12)
-        self._tare = self._latest = self._wrenches()
 
     @property
     def time_step(self) -> float:
@@ -113,31 +98,11 @@ class RigSimulation:
         """Simulated time [s]."""
         return self.steps * self.time_step
 
-    @property
-    def X_WJ(self) -> RigidTransform:
-        """True pose of the jig."""
-        return self.rig.plant.EvalBodyPoseInWorld(self.context, self.rig.jig_base)
-
-    @property
-    def X_WP(self) -> RigidTransform:
-        """True pose of the part."""
-        return self.rig.part.X_WP(self.context)
-
-    @property
-    def X_JP(self) -> RigidTransform:
-        """Pose of the part on the jig."""
-        return self.X_WJ.InvertAndCompose(self.X_WP)
-
-    @property
-    def speed(self) -> float:
-        """Speed of the part's origin in W [m/s]."""
-        return float(np.linalg.norm(self.rig.part.velocity(self.context)[3:]))
-
     # Commands.
 
     def begin(self, name: str) -> None:
         """Start a phase; failures and the log carry its name."""
-        self.log.phases.append((name, self.time))
+        self.observer.begin(name, self.time)
 
     def jaws(self, opening: float, force: float = 0.0) -> None:
         """Drive the tip pads to an opening [m], pressing with a force per pad [N] there."""
@@ -166,11 +131,13 @@ class RigSimulation:
 
     def sleep(self) -> None:
         """Let part and jig rest as they are: nothing touches them, so nothing is computed."""
-        self.rig.sleep(self.root)
+        self.rig.part.sleep(self.root)
+        self.rig.jig_base.sleep(self.root)
 
     def wake(self) -> None:
         """Let part and jig move again."""
-        self.rig.wake(self.root)
+        self.rig.jig_base.wake(self.root)
+        self.rig.part.wake(self.root)
 
     def wait(self, seconds: float) -> None:
         """Hold everything."""
@@ -189,14 +156,14 @@ class RigSimulation:
 
     def lower(self, speed: float, farthest: float, force: float) -> bool:
         """Lower the hand until it is pushed up with a force [N]; return whether that happened."""
-        start, hanging = self.pose, self._latest[5]  # The part's weight is in the reading.
+        start, hanging = self.pose, self.observer.latest[5]  # The part's weight is in the reading.
         for k in range(1, round(farthest / speed / self.time_step) + 1):
             depth = speed * k * self.time_step
             self.pose = HandPose(start.p_WT - [0, 0, depth], start.turn, start.tilt)
             q = self.rig.joints(self.pose)
             self.rig.drive.set_target(self.root, q, np.array([0, 0, -speed, 0, 0]))
             self.step()
-            if self._latest[5] - hanging >= force:
+            if self.observer.latest[5] - hanging >= force:
                 self.rig.drive.set_target(self.root, q, np.zeros(5))
                 return True
         return False
@@ -221,11 +188,10 @@ class RigSimulation:
         try:
             self.simulator.AdvanceTo(self.time)
         except RuntimeError as error:
-            raise self._failure(f"solver failure: {str(error).splitlines()[0]}") from error
+            raise self.observer.failure(f"solver failure: {str(error).splitlines()[0]}") from error
         if self.rig.soft_jig is not None:
             self._step_bag(self.rig.soft_jig)
-        if self._recording and self.steps % self._record_every == 0:
-            self._record()
+        self.observer.step(self.steps, self.time)
         self.stepping_cpu += time.process_time() - start
 
     def _step_bag(self, jig: SoftJig) -> None:
@@ -233,41 +199,9 @@ class RigSimulation:
             jig.step(self.root, self.time_step)
         except CellError as error:
             # An imprint that the bag cannot hold is a verdict on the trial, not bad input.
-            raise self._failure(str(error)) from error
+            raise self.observer.failure(str(error)) from error
         forces = jig.applied_forces
         if forces or self._bed_pushes:
             port = self.rig.plant.get_applied_spatial_force_input_port()
-            port.FixValue(self.context, forces)
+            port.FixValue(self.observer.context, forces)
             self._bed_pushes = bool(forces)
-
-    def tare(self) -> None:
-        """Take the present readings of both wrench sensors for zero; the log starts here."""
-        self._tare = self._tare + self._wrenches()
-        self._recording = True
-
-    def _wrenches(self) -> np.ndarray:
-        readings = [sensor.read(self.context) for sensor in (self.rig.wrist, self.rig.force_plate)]
-        return np.concatenate(readings) - self._tare
-
-    def _record(self) -> None:
-        wrenches = self._wrenches()
-        if self.rig.asleep:  # Nothing is felt of what sleeps: it weighs what it weighed.
-            wrenches[6:] = self._latest[6:]
-        self._latest = wrenches
-        X_WJ, X_WP = self.X_WJ, self.X_WP
-        p_JP = X_WJ.inverse() @ X_WP.translation()
-        if not np.isfinite(p_JP).all():
-            raise self._failure("the state is not finite")
-        self.log.append(
-            time=self.time,
-            X_WJ=X_WJ.GetAsMatrix34(),
-            X_WP=X_WP.GetAsMatrix34(),
-            hand_wrench=self._latest[:6],
-            force_plate=self._latest[6:],
-        )
-        if p_JP[2] < -DROPPED_BELOW or np.hypot(p_JP[0], p_JP[1]) > DROPPED_BESIDE:
-            raise self._failure(f"'{self.rig.part.part.name}' dropped off the jig")
-
-    def _failure(self, evidence: str) -> PhaseFailed:
-        phase = self.log.phases[-1][0] if self.log.phases else "start"
-        return PhaseFailed(phase, evidence)

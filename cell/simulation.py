@@ -242,11 +242,14 @@ class _PhaseRun:
         )
 
     def finish(self) -> None:
-        """Leave the arms where their commands end."""
-        for name in self.commands:
+        """Leave the arms where their commands end; a motion that was cut short stops there."""
+        for name, command in self.commands.items():
             arm = self.cell.arms[name]
             if arm.in_torque_drive():
                 self._hold_here(arm)
+            elif command is not None and not isinstance(command, Follow | Impedance):
+                q, _ = command.at(self._time())
+                self.cell.drives[name].set_target(self.root, q, np.zeros(6))
 
 
 def impedance_torque(arm: Arm, context: Context, command: Impedance, t: float) -> np.ndarray:

@@ -32,6 +32,7 @@ def save_state(simulation: Simulation) -> State:
         # The latest readings, too: Drake derives them from the step that led here.
         state[f"{name}/wrist"] = simulation.wrists[name].copy()
         state[f"{name}/tare"] = simulation.tare[name].copy()
+    state["jig_base/asleep"] = np.array(cell.jig_base.asleep)
     for part in cell.parts:
         state[f"asleep/{part.part.name}"] = np.array(part.asleep)
         state[f"pressing/{part.part.name}"] = np.array(part.body in cell.soft_jig.pressing)
@@ -76,6 +77,7 @@ def restore_state(simulation: Simulation, state: State) -> None:
             None if state[f"thread/{name}/bit"] < 0 else int(state[f"thread/{name}/bit"]),
             float(state[f"thread/{name}/caught_angle"]),
         )
+    cell.jig_base.wake(root)
     for part in cell.parts:
         part.wake(root)
         if state[f"pressing/{part.part.name}"]:
@@ -87,6 +89,8 @@ def restore_state(simulation: Simulation, state: State) -> None:
     for part in cell.parts:
         if state[f"asleep/{part.part.name}"]:
             part.sleep(root)
+    if state["jig_base/asleep"]:
+        cell.jig_base.sleep(root)
     for name, arm in cell.arms.items():
         simulation.wrists[name] = state[f"{name}/wrist"]
         simulation.tare[name] = state[f"{name}/tare"]

@@ -57,6 +57,7 @@ class Experiment:
     Attributes:
         command: "place" or "push".
         config: Every number.
+        hand: "rig" or "robot".
         bed: "soft" or "rigid".
         trials: Of each case.
         seed: Of the disturbances.
@@ -66,6 +67,7 @@ class Experiment:
 
     command: str
     config: CellConfig
+    hand: str
     bed: str
     trials: int
     seed: int
@@ -110,7 +112,7 @@ def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, 
         "product": "motor_unit",
         "order": [],
         "seed": experiment.seed,
-        "hand": "rig",
+        "hand": experiment.hand,
         "bed": experiment.bed,
         "verdict": verdict(results),
         "cases": [_case(result) for result in results],

@@ -10,9 +10,9 @@ import numpy as np
 from scipy.stats import binomtest
 
 from cell.config import CellConfig
+from cell.errors import CellError
 from cell.product import Product
-from cell.rig import Rig, build_push_rig
-from cell.rig_simulation import RigSimulation
+from cell.stage import Observer
 from experiments.metrics.trial import (
     measure_place,
     measure_push,
@@ -20,7 +20,9 @@ from experiments.metrics.trial import (
     push_succeeded,
 )
 from experiments.postures import Posture, Push
-from experiments.rig_trial import Trial, check_fits, ignore, run_trial
+from experiments.rig_hand import RigBench
+from experiments.robot_hand import RobotBench
+from experiments.trial import Bench, Disturbance, Trial, check_fits, ignore, run_trial
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,8 @@ def run_cases(
     bed: str,
     trials: int,
     seed: int,
-    watch: Callable[[Case, str, RigSimulation], None] | None = None,
+    hand: str = "rig",
+    watch: Callable[[Case, str, Observer], None] | None = None,
 ) -> Iterator[tuple[CaseResult, TrialResult]]:
     """Run every trial of every case; yield each when it is done, with its case so far.
 
@@ -131,31 +134,45 @@ def run_cases(
         config: Every number, the same for all cases.
         bed: "soft" or "rigid".
         trials: Of each case.
-        seed: Seeds the disturbances.
+        seed: Seeds the disturbances: the same for both hands.
+        hand: "rig" or "robot".
         watch: Told of the events of the first trial of each case.
 
     Raises:
-        BadPart: Before any trial, for a part that has no room on the bag.
+        CellError: Before any trial: a part that has no room on the bag (`BadPart`), or a bed that
+            the hand cannot be had with.
     """
+    check_hand(hand, bed)
     for case in cases:
         check_fits(config, product.parts[case.posture.part], case.posture)
-    rigs: dict[str, Rig] = {}
     for case in cases:
-        part = case.posture.part
-        rig = rigs.setdefault(part, build_push_rig(config, product, part, bed))
+        bench = _bench(case, product, config, bed, hand)
         result = CaseResult(case)
         for k in range(trials):
-            rng = case_seed(seed, case.label, k)
+            disturbance = Disturbance.draw(config, case_seed(seed, case.label, k))
             follow = ignore if watch is None or k > 0 else _bound(watch, case)
-            trial = run_trial(rig, case.posture, case.push, rng, follow)
+            trial = run_trial(bench.begin(disturbance), case.push, follow)
             result.trials.append(judged(case, trial))
             yield result, result.trials[-1]
 
 
-def _bound(
-    watch: Callable[[Case, str, RigSimulation], None], case: Case
-) -> Callable[[str, RigSimulation], None]:
-    return lambda event, simulation: watch(case, event, simulation)
+def check_hand(hand: str, bed: str) -> None:
+    """Raise `CellError` for a bed that a hand cannot be had with."""
+    if hand == "robot" and bed != "soft":
+        raise CellError(
+            f"--bed {bed} is for --hand rig: the cell that --hand robot works in has the soft jig."
+        )
+
+
+def _bench(case: Case, product: Product, config: CellConfig, bed: str, hand: str) -> Bench:
+    """Build what a case's trials are run with; cheap beside a trial."""
+    if hand == "robot":
+        return RobotBench.build(config, product, case.posture, case.push)
+    return RigBench.build(config, product, case.posture, bed)
+
+
+def _bound(watch: Callable[[Case, str, Observer], None], case: Case) -> Callable:
+    return lambda event, observer: watch(case, event, observer)
 
 
 def judged(case: Case, trial: Trial) -> TrialResult:

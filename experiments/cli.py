@@ -182,8 +182,8 @@ class Place:
     trials: int = 10
     """Trials of each case."""
 
-    hand: Literal["rig"] = "rig"
-    """What carries the gripper: a position-controlled rig."""
+    hand: Literal["rig", "robot"] = "rig"
+    """What carries the gripper: a position-controlled rig, or the arm, with planned motions."""
 
     pressure: Annotated[float | None, arg(metavar="KPA")] = None
     """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
@@ -208,8 +208,8 @@ class Push:
     trials: int = 5
     """Trials of each case."""
 
-    hand: Literal["rig"] = "rig"
-    """What carries the gripper: a position-controlled rig."""
+    hand: Literal["rig", "robot"] = "rig"
+    """What carries the gripper: a position-controlled rig, or the arm, with planned motions."""
 
     pressure: Annotated[float | None, arg(metavar="KPA")] = None
     """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
@@ -250,15 +250,24 @@ class Regress:
 def _run_experiment(command: str, options: Place | Push) -> int:
     """Check everything that was asked for, then run it."""
     from experiments.case_results import Experiment
+    from experiments.cases import check_hand
     from experiments.place_push import cases_of, check_trials, run_experiment, with_pressure
 
     common = options.common
     config = with_pressure(common.load_config(), options.pressure)
     check_trials(options.trials)
+    check_hand(options.hand, options.bed)
     cases_of(command, options.case)
     with output_folder(common.out) as out:
         experiment = Experiment(
-            command, config, options.bed, options.trials, common.seed, out, common.quiet
+            command,
+            config,
+            options.hand,
+            options.bed,
+            options.trials,
+            common.seed,
+            out,
+            common.quiet,
         )
         return run_experiment(experiment, options.case)
 

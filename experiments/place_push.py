@@ -1,4 +1,4 @@
-"""``soft-jig place`` and ``soft-jig push``: the paper's experiments, with the rig's hand."""
+"""``soft-jig place`` and ``soft-jig push``: the paper's experiments, with either hand."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from rich.progress import Progress
 from cell.config import CellConfig
 from cell.errors import CellError
 from cell.loading import load_product
-from cell.rig_simulation import RigSimulation
+from cell.stage import Observer
 from experiments.case_results import Experiment, case_table, verdict, write_case_results
 from experiments.cases import Case, CaseResult, run_cases
 from experiments.postures import POSTURES, PUSHES, chosen
@@ -72,6 +72,7 @@ def run_experiment(experiment: Experiment, label: str | None) -> int:
             bed=experiment.bed,
             trials=experiment.trials,
             seed=experiment.seed,
+            hand=experiment.hand,
             watch=album.take,
         )
         for result, trial in done:
@@ -94,14 +95,14 @@ class _Album:
         problem = rendering_problem()
         self.notes = [] if problem is None else [f"No pictures: {problem}."]
 
-    def take(self, case: Case, event: str, simulation: RigSimulation) -> None:
+    def take(self, case: Case, event: str, seen: Observer) -> None:
         """Take the picture of an event."""
         ended_early = event == "end" and not self._is_last(case, "after")
         if self.notes or event not in self.wanted or (event == "end" and not ended_early):
             return
-        view = view_of(simulation.rig.config.workcell.X_WJ)
+        view = view_of(seen.stage.config.workcell.X_WJ)
         caption = f"{case.label}: {event}"
-        scene = take_picture(simulation.rig.scene_graph, simulation.root, view)
+        scene = take_picture(seen.stage.scene_graph, seen.root, view)
         self.pictures.append((caption, scene))
 
     def _is_last(self, case: Case, event: str) -> bool:

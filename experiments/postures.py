@@ -9,9 +9,10 @@ z = 0 (motor side) and 5 mm, and the foot at y = -33 .. -28 mm, reaching to z = 
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
+from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.errors import UnknownName
@@ -27,14 +28,16 @@ AXES = {
 
 @dataclass(frozen=True)
 class Posture:
-    """How a part stands on the jig, and how the rig's hand brings it there.
+    """How a part stands on the jig, and how a hand brings it there.
 
     Attributes:
         part: "motor" or "plate".
         name: The paper's label.
         up: Axis of P that points up.
         meaning: In words.
-        grasp: From above or from the side, by hand as in the paper.
+        grasp: From above or from the side, chosen by hand as in the paper.
+        X_PTurned: How the part lies in the tray, from its pose in the product file: turned so that
+            this grasp is within the robot's reach there, too.
     """
 
     part: str
@@ -42,6 +45,7 @@ class Posture:
     up: str
     meaning: str
     grasp: Grasp
+    X_PTurned: RigidTransform = field(default_factory=RigidTransform)
 
     @property
     def label(self) -> str:
@@ -80,32 +84,57 @@ def _grasp(
     name: str,
     jaw: str,
     at_mm: tuple[float, float, float],
-    approach: str,
+    approach: np.ndarray,
     closing: str,
     width_mm: float,
     force: float,
 ) -> Grasp:
-    x, z = AXES[closing], AXES[approach]
+    x, z = AXES[closing], approach
     R_PJaw = RotationMatrix(np.column_stack([x, np.cross(z, x), z]))
     return Grasp(name, jaw, RigidTransform(R_PJaw, np.array(at_mm) * MM), width_mm * MM, force)
 
 
-# The motor is held by its sides with a level hand, the recessed jaws above; the level plate from
-# above, close to its centre of mass, with the fingertips beyond the foot. The force is the most
-# that the gripper has: what is pressed off the pads' middle turns in a weaker grip.
-MOTOR_LYING = _grasp("gearbox", "tip", (0, 0, -14), "-z", "+x", 36.8, 65.0)
-MOTOR_STANDING = _grasp("can", "tip", (0, 0, -33), "-y", "+x", 34.8, 65.0)
-PLATE_FOOT_UP = _grasp("edges", "wide", (0, -21, -2.5), "+z", "+x", 70.0, 65.0)
-PLATE_FOOT_DOWN = _grasp("edges", "wide", (0, -21, 7.5), "-z", "-x", 70.0, 65.0)
-PLATE_ON_FOOT = _grasp("edges", "wide", (0, 17, 2.5), "-y", "+x", 70.0, 65.0)
-PLATE_ON_SIDE = _grasp("face", "tip", (23, -8.8, 2.5), "-x", "+z", 5.0, 65.0)
+def _leaning(axis: str, towards: str, angle_deg: float) -> np.ndarray:
+    """Return an axis of P, leaning towards another one, as a unit vector (3,)."""
+    angle = np.deg2rad(angle_deg)
+    return np.cos(angle) * AXES[axis] + np.sin(angle) * AXES[towards]
+
+
+def _turned(axis: str, angle_deg: float, through_mm: tuple[float, float, float]) -> RigidTransform:
+    """Return the pose of a part turned about an axis of P through a point of P."""
+    p = np.array(through_mm) * MM
+    turn = RigidTransform(AngleAxis(np.deg2rad(angle_deg), AXES[axis]), [0.0, 0.0, 0.0])
+    return RigidTransform(p) @ turn @ RigidTransform(-p)
+
+
+# The motor is held by its sides, lying with a level hand and the recessed jaws above; the level
+# plate from above, close to its centre of mass, with the fingertips beyond the foot; the plate on
+# end by its edges, on the foot with a hand that leans by 20 deg, for a level one cannot fetch it.
+# The force is the most that the gripper has: what is pressed off the pads' middle turns in a weaker
+# grip.
+MOTOR_LYING = _grasp("gearbox", "tip", (0, 0, -14), AXES["-z"], "+x", 36.8, 65.0)
+MOTOR_STANDING = _grasp("can", "tip", (0, 0, -33), AXES["-y"], "+x", 34.8, 65.0)
+PLATE_FOOT_UP = _grasp("edges", "wide", (0, -21, -2.5), AXES["+z"], "+x", 70.0, 65.0)
+PLATE_FOOT_DOWN = _grasp("edges", "wide", (0, -21, 7.5), AXES["-z"], "-x", 70.0, 65.0)
+LEANING = _leaning("-y", "-z", 20.0)
+PLATE_ON_FOOT = _grasp("edges", "wide", (0, 17, 2.5), LEANING, "-x", 70.0, 65.0)
+PLATE_ON_SIDE = _grasp("edges", "wide", (20, -3, 2.5), AXES["-x"], "+y", 60.0, 65.0)
+
+# The tray's cradle takes the motor in any roll, its ledges take the plate either way up.
+SHAFT_LOW = _turned("+z", -90.0, (0, 0, 0))
+SHAFT_HIGH = _turned("+z", 90.0, (0, 0, 0))
+FOOT_HIGH = _turned("+y", 180.0, (0, 0, 2.5))
 
 POSTURES = {
     posture.label: posture
     for posture in (
-        Posture("motor", "P1", "-y", "lying on its side, shaft low", MOTOR_LYING),
-        Posture("motor", "P2", "+z", "standing on its terminals, shaft up", MOTOR_STANDING),
-        Posture("plate", "P1", "-z", "face level, motor side and foot up", PLATE_FOOT_UP),
+        Posture("motor", "P1", "-y", "lying on its side, shaft low", MOTOR_LYING, SHAFT_LOW),
+        Posture(
+            "motor", "P2", "+z", "standing on its terminals, shaft up", MOTOR_STANDING, SHAFT_HIGH
+        ),
+        Posture(
+            "plate", "P1", "-z", "face level, motor side and foot up", PLATE_FOOT_UP, FOOT_HIGH
+        ),
         Posture("plate", "P2", "+y", "standing on the foot's 70 x 20 face", PLATE_ON_FOOT),
         Posture("plate", "P3", "+x", "standing on a side edge", PLATE_ON_SIDE),
         Posture("plate", "P4", "+z", "face level, bolt side up, foot down", PLATE_FOOT_DOWN),

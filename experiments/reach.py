@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import Box, Cylinder
 
-from cell.rig import Rig
+from cell.stage import Stage
 
 
 @dataclass(frozen=True)
@@ -22,15 +22,17 @@ class Fingers:
     upper: np.ndarray
 
     @staticmethod
-    def of_hand(rig: Rig) -> Fingers:
+    def of_hand(stage: Stage) -> Fingers:
         """Read the boxes (and the palm, by its bounding box) from the closed hand's model."""
-        plant, inspector = rig.plant, rig.scene_graph.model_inspector()
+        plant, inspector = stage.plant, stage.scene_graph.model_inspector()
         context = plant.CreateDefaultContext()
         for name in ("finger_left_joint", "finger_right_joint"):
-            plant.GetJointByName(name, rig.gripper.instance).set_translation(context, 0.0)
-        X_TW = plant.GetFrameByName("tip", rig.gripper.instance).CalcPoseInWorld(context).inverse()
+            plant.GetJointByName(name, stage.gripper.instance).set_translation(context, 0.0)
+        X_TW = (
+            plant.GetFrameByName("tip", stage.gripper.instance).CalcPoseInWorld(context).inverse()
+        )
         corners = []
-        for body in map(plant.get_body, plant.GetBodyIndices(rig.gripper.instance)):
+        for body in map(plant.get_body, plant.GetBodyIndices(stage.gripper.instance)):
             X_TB = X_TW @ plant.EvalBodyPoseInWorld(context, body)
             for geometry in plant.GetCollisionGeometriesForBody(body):
                 half = _half_size(inspector.GetShape(geometry))

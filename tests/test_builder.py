@@ -126,6 +126,6 @@ def test_jig_base_rests_on_the_force_plate_bolted_or_free(fixed: str) -> None:
     X_WJ = cell.soft_jig.pose(simulation.context)
     assert np.linalg.norm(X_WJ.translation() - cell.X_WJ.translation()) < 0.1e-3
     bodies = [cell.plant.GetBodyByName(name) for name in ("force_plate", "jig_base")]
-    weight = 9.81 * sum(body.default_mass() for body in bodies)
+    weight = 9.81 * sum(body.get_mass(simulation.context) for body in bodies)
     wrench = cell.force_plate.read(simulation.context)
     np.testing.assert_allclose(wrench[3:], [0.0, 0.0, -weight], atol=0.01 * weight)

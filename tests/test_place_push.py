@@ -14,7 +14,7 @@ from experiments.metrics.trial import force_peaks
 from experiments.place_push import run_experiment
 from experiments.postures import POSTURES, PUSHES
 from experiments.regress import SUITES, TOLERANCES, drifts
-from experiments.rig_trial import Trial
+from experiments.trial import Trial
 
 
 def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture) -> str:
@@ -38,6 +38,8 @@ def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture)
         (["push", "--set", "jig.vacuum.pressure=9e9"], "between 0"),
         (["push", "--set", "push.jig_mass=0.2"], "push.jig_mass"),
         (["place", "--set", "jig.bag.cap_height=0.005"], "wide"),
+        (["place", "--hand", "robot", "--bed", "rigid"], "--bed rigid is for --hand rig"),
+        (["push", "--hand", "foot"], "robot"),
         (["regress", "--suite", "huge"], "huge"),
     ],
 )
@@ -49,7 +51,7 @@ def test_bad_input_is_one_line_and_writes_nothing(
 
 def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:
     """The motor on a rigid plate: a verdict with figures, exit code 1, and a whole report."""
-    experiment = Experiment("place", CellConfig(), "rigid", 1, 0, tmp_path, quiet=True)
+    experiment = Experiment("place", CellConfig(), "rig", "rigid", 1, 0, tmp_path, quiet=True)
     assert run_experiment(experiment, "motor/P2") == 1
     result = json.loads((tmp_path / "result.json").read_text())
     (case,) = result["cases"]

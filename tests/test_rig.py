@@ -14,7 +14,9 @@ from cell.soft_jig import SurfaceSamples
 from experiments.cases import Case, case_seed, judged, wilson
 from experiments.metrics.trial import tilt_between
 from experiments.postures import AXES, POSTURES, PUSHES, chosen
-from experiments.rig_trial import check_fits, planned_pose, push_start, run_trial, tip_pose
+from experiments.push_rule import push_line
+from experiments.rig_hand import RigBench, tip_pose
+from experiments.trial import Disturbance, check_fits, planned_pose, run_trial
 
 
 @pytest.fixture(scope="module")
@@ -90,7 +92,8 @@ def test_paths_arrive_and_the_stroke_stops_dead() -> None:
 def test_pins_do_not_let_the_motor_stand_on_a_rigid_plate(motor_rig) -> None:
     """The paper's reason for a soft jig: on a metal plate the motor falls over."""
     posture = POSTURES["motor/P2"]
-    trial = run_trial(motor_rig, posture, None, np.random.default_rng(0))
+    disturbance = Disturbance.draw(motor_rig.config, np.random.default_rng(0))
+    trial = run_trial(RigBench(motor_rig, posture).begin(disturbance), None)
     result = judged(Case(posture), trial)
     assert not result.success
     # The press was felt under the jig: the hand's limit is 20 N.
@@ -103,14 +106,14 @@ def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
     apex = config.jig.bag.cap_height
     X_WP = planned_pose(part, push.posture, X_WJ, apex)
     pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
-    simulation = RigSimulation(motor_rig, X_WJ, X_WP, pose)
-    start, direction = push_start(simulation, push)
+    seen = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer
+    line = push_line(seen.stage, push, seen.X_WJ, seen.X_WP)
     low = X_WJ.translation()[2] + apex + 0.0063  # The can's rear face: the terminals are 6.3 mm.
-    fingers = start.p_WT[2] - 0.024  # The noses end 24 mm below the tip frame.
+    fingers = line.X_WT.translation()[2] - 0.024  # The noses end 24 mm below the tip frame.
     assert fingers == pytest.approx(low + 0.6 * 0.0534, abs=1e-4)
-    assert direction == pytest.approx(X_WP.rotation() @ [1.0, 0.0, 0.0])
+    assert line.direction == pytest.approx(X_WP.rotation() @ [1.0, 0.0, 0.0])
     # The pads lead, 8 mm before the tip frame; the gearbox has a radius of 18.4 mm.
-    ahead = (start.p_WT - X_WP.translation()) @ direction
+    ahead = (line.X_WT.translation() - X_WP.translation()) @ line.direction
     assert ahead == pytest.approx(-0.0184 - 0.008 - config.push.start_gap, abs=3e-4)
 
 

@@ -29,7 +29,7 @@ BASE = (260.0, 200.0, 8.0)
 PRINTED = 1240.0  # kg/m3, PLA [A].
 
 # The motor lies with its shaft along +y_T and its own +x down: gearbox and can, prisms of 16 flats
-# in contact, have a flat towards each slab of the cradles.
+# in contact, have a flat towards each slab of the cradles, also when it is turned by 90 degrees.
 MOTOR_AXIS_X, MOTOR_AXIS_Z = -70.0, 32.0
 
 # The plate lies foot down with x_A along x_T.
@@ -56,7 +56,8 @@ def motor_nest() -> list[Piece]:
     rear = _cradle("motor_rear", can, y_low=5.5, y_high=11.5)
     x = MOTOR_AXIS_X
     stops = [
-        box_piece("motor_stop_front", (x - 8, 59, 0), (x + 8, 62, 22), PLASTIC),
+        # Below the boss, also of a motor that lies with its shaft down.
+        box_piece("motor_stop_front", (x - 8, 59, 0), (x + 8, 62, 18), PLASTIC),
         box_piece("motor_stop_rear", (x - 8, 0.6, 0), (x + 8, 3.6, 18.5), PLASTIC),
     ]
     return [*front, *rear, *stops]

@@ -8,7 +8,7 @@ from scipy.ndimage import uniform_filter1d
 
 from experiments.camera import seen_displacement
 from experiments.metrics.common import Measured, angle_between
-from experiments.rig_trial import HOVER, Trial
+from experiments.trial import HOVER, Trial
 
 SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
 UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], read as this tilt [A].

@@ -20,7 +20,14 @@ from planning.operations.grasping import (
     reachable_grasps,
     take,
 )
-from planning.operations.placement import HOVER, RETREAT, Placement, choose_placement
+from planning.operations.placement import (
+    HOVER,
+    RETREAT,
+    Placement,
+    Suits,
+    anywhere,
+    choose_placement,
+)
 from planning.operations.station import Station
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
@@ -34,7 +41,11 @@ SETTLE_TIME = 1.0
 
 
 def pick_place(
-    station: Station, part: str, up: str, later: tuple[str, ...] = ()
+    station: Station,
+    part: str,
+    up: str,
+    later: tuple[str, ...] = (),
+    suits: Suits = anywhere,
 ) -> Iterator[Phase]:
     """Yield the phases that fix a part on the jig.
 
@@ -43,10 +54,11 @@ def pick_place(
         part: Name of the part.
         up: Axis of the product frame that shall point up.
         later: Names of the parts that will be mated with it: its yaw must suit them.
+        suits: Whether its pose on the jig suits whatever else comes later.
     """
     yield Phase(f"{part}: look", after(0.2), 1.0, start=(inflate_jig,), awake=frozenset([part]))
     station.origins[part] = station.sense(part)
-    reach, placement = _choose(station, part, up, later)
+    reach, placement = _choose(station, part, up, later, suits)
     yield from take(station, part, reach, LIFT)
     awake, holding = frozenset([part]), lost_grasp(station.held_opening)
     frame = station.arm("left").frame(reach.grasp.jaw)
@@ -90,13 +102,13 @@ def pick_place(
 
 
 def _choose(
-    station: Station, part: str, up: str, later: tuple[str, ...]
+    station: Station, part: str, up: str, later: tuple[str, ...], suits: Suits
 ) -> tuple[Reach, Placement]:
     """Return the first grasp with a placement, grasps from above first."""
     failure = None
     for reach in _top_first(station, part, station.sense(part)):
         try:
-            return reach, choose_placement(station, part, up, reach, later)
+            return reach, choose_placement(station, part, up, reach, later, suits)
         except Unreachable as error:
             failure = error
     raise failure or no_grasp(station, part)
@@ -123,9 +135,14 @@ def pressed(force: float) -> Condition:
 
 
 def jammed(station: Station, least: float) -> Condition:
-    """End condition: the jig is frozen and the pump has run for ``least`` [s]."""
+    """End condition: the jig is frozen and the pump has run for ``least`` [s].
+
+    With no vacuum at all there is nothing to freeze.
+    """
+    jig = station.cell.soft_jig
 
     def condition(sensed: Sensed) -> bool:
-        return sensed.time >= least and station.cell.soft_jig.state is JigState.JAMMED
+        frozen = jig.state is JigState.JAMMED or jig.params.vacuum.pressure == 0
+        return sensed.time >= least and frozen
 
     return condition

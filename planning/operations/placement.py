@@ -6,7 +6,7 @@ part and, later, bring and hold every part that the plan mates with it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -37,6 +37,14 @@ class Placement:
     yaw: float
     X_WP: RigidTransform
     q: np.ndarray
+
+
+Suits = Callable[[RigidTransform], bool]
+
+
+def anywhere(X_WP: RigidTransform) -> bool:
+    """Suit every pose of the part on the jig."""
+    return True
 
 
 def upright(up: str, yaw: float) -> RotationMatrix:
@@ -71,7 +79,12 @@ def pose_on_jig(station: Station, part: str, up: str, yaw: float, height: float)
 
 
 def choose_placement(
-    station: Station, part: str, up: str, reach: Reach, later: tuple[str, ...]
+    station: Station,
+    part: str,
+    up: str,
+    reach: Reach,
+    later: tuple[str, ...],
+    suits: Suits = anywhere,
 ) -> Placement:
     """Return the first yaw at which the part can be placed and every later part mated.
 
@@ -81,13 +94,15 @@ def choose_placement(
         up: Axis of the product frame that points up.
         reach: The grasp it is held with.
         later: Names of the parts that will be brought to it.
+        suits: Whether the pose X_WP of the seated part suits whatever else comes later.
     """
     apex = station.config.jig.bag.cap_height
     for yaw, X_WP, q in _placeable(station, part, up, reach, apex + HOVER):
         seated = pose_on_jig(station, part, up, yaw, apex - LIKELY_DEPTH)
         X_WA = seated @ station.part(part).X_AP.inverse()
         leaves = _leaves(station, reach, seated @ reach.grasp.X_PJaw, q)
-        if leaves and all(_mates(station, name, X_WA) for name in later):
+        mates = all(_mates(station, name, X_WA) for name in later)
+        if leaves and mates and suits(seated):
             return Placement(yaw, X_WP, q)
     goal = pose_on_jig(station, part, up, 0.0, apex + HOVER)
     raise Unreachable("left", reach.grasp.jaw, goal @ reach.grasp.X_PJaw, f"no yaw suits '{part}'")

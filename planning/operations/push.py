@@ -1,0 +1,141 @@
+"""Operation push: the closed left hand pushes what stands on the jig straight along a line."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from scipy.interpolate import CubicSpline
+
+from cell.phase import Jaw, Phase, motion_finished
+from cell.stroke import Stroke
+from planning.motion.kinematics import Unreachable, tool_pose
+from planning.motion.paths import NoPath, plan_line
+from planning.motion.timing import JointMotion
+from planning.operations.grasping import HAND_SPEED
+from planning.operations.station import Station
+
+# The hand comes from above and behind, then straight down, then slowly forward to the start.
+ABOVE, BEHIND_ABOVE = 0.12, 0.05  # [m] [A]
+BEHIND = 0.02  # [m] [A]
+MOTION_STEP = 1e-3  # Between two samples of the push's motion [s] [A].
+
+
+@dataclass(frozen=True)
+class PushLine:
+    """A straight push of the closed hand, which keeps its orientation.
+
+    Attributes:
+        X_WT: Where the frame between the tip pads, T, starts.
+        direction: (3,) unit vector in W, level.
+        stroke: How far and how fast.
+    """
+
+    X_WT: RigidTransform
+    direction: np.ndarray
+    stroke: Stroke
+
+    def at(self, distance: float, above: float = 0.0) -> RigidTransform:
+        """Return X_WT a distance along the line, and a height above it [m]."""
+        p_WT = self.X_WT.translation() + distance * self.direction + [0.0, 0.0, above]
+        return RigidTransform(self.X_WT.rotation(), p_WT)
+
+
+@dataclass(frozen=True)
+class PushMotion:
+    """The joints' part of a push.
+
+    Attributes:
+        q_high: (6,) above and behind the start.
+        motion: Of the push itself.
+    """
+
+    q_high: np.ndarray
+    motion: JointMotion
+
+
+def can_push(station: Station, part: str, line: PushLine) -> bool:
+    """Return whether the left arm can bring its hand to a push and carry it out."""
+    return _found(station, part, line) is not None
+
+
+def push(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
+    """Yield the phase that pushes; the hand is at the start of the line."""
+    q = station.arm("left").positions(station.context)
+    motion = _stroke(station, q, line)
+    yield Phase("push", motion_finished, 5.0, left=motion, awake=frozenset([part]), tare=False)
+
+
+def approach(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
+    """Yield the phases that bring the closed hand to the start of a push."""
+    found = _found(station, part, line)
+    if found is None:
+        reason = f"no joint configuration carries '{part}' along the whole push"
+        raise Unreachable("left", "tip", line.X_WT, reason)
+    frame = station.arm("left").frame("tip")
+    yield Phase(
+        "approach: above",
+        motion_finished,
+        timeout=20.0,
+        left=station.move("left", found.q_high, _may_touch(part)),
+        jaw=Jaw(0.0),
+    )
+    for name, distance in (("down", -BEHIND), ("start", 0.0)):
+        motion = station.line("left", frame, line.at(distance), speed=HAND_SPEED)
+        yield Phase(f"approach: {name}", motion_finished, timeout=10.0, left=motion)
+
+
+def _found(station: Station, part: str, line: PushLine) -> PushMotion | None:
+    """Return the motion from the start configuration nearest to where the arm is, if any works."""
+    arm, frame = station.arm("left"), station.arm("left").frame("tip")
+    near, may_touch = arm.positions(station.context), _may_touch(part)
+    for q in station.configurations("left", frame, line.X_WT, near, may_touch):
+        try:
+            motion = _stroke(station, q, line)
+            back = plan_line(arm, station.context, frame, q, line.at(-BEHIND)).waypoints[-1]
+            high = line.at(-BEHIND_ABOVE, ABOVE)
+            q_high = plan_line(arm, station.context, frame, back, high).waypoints[-1]
+        except (NoPath, Unreachable):
+            continue
+        if station.model.is_free("left", q_high):
+            return PushMotion(q_high, motion)
+    return None
+
+
+def _may_touch(part: str) -> list[tuple[str, str]]:
+    """Return what the hand may come close to: the push's rule keeps it clear of the bed."""
+    return [("left_tool", part), ("left_tool", "jig_base")]
+
+
+def _stroke(station: Station, q_start: np.ndarray, line: PushLine) -> JointMotion:
+    """Return the joints' motion along a push line.
+
+    Raises:
+        Unreachable: The line leaves the workspace.
+        NoPath: The arm would collide or flip, or a joint is too slow.
+    """
+    arm, frame, stroke = station.arm("left"), station.arm("left").frame("tip"), line.stroke
+    X_WT = tool_pose(arm, station.context, frame, q_start)
+    goal = RigidTransform(X_WT.rotation(), X_WT.translation() + stroke.way * line.direction)
+    path = plan_line(
+        arm,
+        station.context,
+        frame,
+        q_start,
+        goal,
+        is_free=lambda q: station.model.is_free("left", q),
+    )
+    # Waypoints are evenly spaced along the line; between them the spline is off by below 1 um [D].
+    curve = CubicSpline(np.linspace(0.0, stroke.way, len(path.waypoints)), path.waypoints)
+    time = np.linspace(0.0, stroke.duration, int(np.ceil(stroke.duration / MOTION_STEP)) + 1)
+    # Just before the end, for there it stops dead.
+    gone = np.array([stroke.at(min(t, stroke.duration - 1e-9)) for t in time])
+    q, v = curve(gone[:, 0]), curve(gone[:, 0], 1) * gone[:, 1:]
+    limits = np.array([joint.velocity_upper_limits()[0] for joint in arm.joints])
+    fastest = np.max(np.abs(v) / limits, axis=0)
+    if fastest.max() > 1.0:
+        joint = arm.joints[int(fastest.argmax())].name()
+        raise NoPath("left", f"{joint} would turn at {fastest.max():.1f} times its limit in a push")
+    return JointMotion(time, q, v)

@@ -1,0 +1,80 @@
+"""The jig's base on the force plate: weight and place of a free one, its sleep, a bolted one."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform
+
+from cell import Cell, CellConfig, build_cell, load_product
+from cell.simulation import Simulation
+from cell.stroke import Stroke
+
+
+def empty_cell(fixed: bool) -> Cell:
+    config = CellConfig.load(overrides=[f"workcell.jig_base_fixed={str(fixed).lower()}"])
+    product = replace(load_product("motor_unit"), parts={}, fasteners={}, fits=(), groups={})
+    return build_cell(config, product)
+
+
+def settled(cell: Cell, steps: int = 150) -> Simulation:
+    simulation = Simulation(cell)
+    for _ in range(steps):
+        simulation.step()
+    return simulation
+
+
+def test_free_base_stands_where_it_was_set_and_weighs_what_is_configured() -> None:
+    cell = empty_cell(fixed=False)
+    simulation = settled(cell)
+    rest = cell.force_plate.read(simulation.context)
+    config, root = cell.config, simulation.root
+    X_WJ = RigidTransform(cell.X_WJ.rotation(), cell.X_WJ.translation() + [0.02, -0.01, 0.0])
+    cell.jig_base.reset(root, X_WJ)
+    for _ in range(150):
+        simulation.step()
+    assert cell.jig_base.X_WJ(simulation.context).IsNearlyEqualTo(X_WJ, 1e-4)
+    assert cell.force_plate.read(simulation.context)[5] == pytest.approx(rest[5], abs=0.05)
+    cell.jig_base.sleep(root)
+    simulation.step()
+    simulation.step()
+    plate_alone = cell.force_plate.read(simulation.context)
+    assert abs(rest[5] - plate_alone[5]) == pytest.approx(config.push.jig_mass * 9.81, rel=0.01)
+
+
+def test_a_sleeping_base_does_not_move_and_goes_on_from_rest() -> None:
+    cell = empty_cell(fixed=False)
+    simulation = settled(cell)
+    base, root = cell.jig_base, simulation.root
+    before = base.X_WJ(simulation.context)
+    base.sleep(root)
+    assert base.asleep
+    with base.filters_lifted(root):
+        assert not base.asleep
+    assert base.asleep
+    for _ in range(20):
+        simulation.step()
+    assert base.X_WJ(simulation.context).IsExactlyEqualTo(before)
+    base.wake(root)
+    for _ in range(50):
+        simulation.step()
+    assert base.X_WJ(simulation.context).IsNearlyEqualTo(before, 1e-4)
+
+
+def test_a_bolted_base_neither_sleeps_nor_moves() -> None:
+    cell = empty_cell(fixed=True)
+    simulation = settled(cell, 2)
+    cell.jig_base.reset(simulation.root, RigidTransform([1.0, 0.0, 0.0]))
+    cell.jig_base.sleep(simulation.root)
+    assert not cell.jig_base.asleep
+    assert cell.jig_base.X_WJ(simulation.context).IsNearlyEqualTo(cell.X_WJ, 1e-12)
+
+
+def test_a_short_stroke_never_reaches_its_speed() -> None:
+    stroke = Stroke(way=0.002, speed=0.25, acceleration=2.5)
+    assert stroke.top == pytest.approx(np.sqrt(2 * 2.5 * 0.002))
+    assert stroke.at(stroke.duration) == (0.002, 0.0)
+    times = np.linspace(0.0, stroke.duration - 1e-9, 200)
+    way = np.array([stroke.at(t)[0] for t in times])
+    rates = np.array([stroke.at(t)[1] for t in times])
+    assert np.gradient(way, times)[1:-1] == pytest.approx(rates[1:-1], abs=1e-3)
