@@ -52,10 +52,13 @@ class SoilParameters:
         gravity_pressure: Mean confinement by the beads' own weight [Pa]. [D] 250, range 200-420.
         membrane_modulus: Shear modulus times thickness [N/m]. [R] 0.15 MPa x 1 mm; 100-150.
         initial_stretch: Stretch of the membrane on the bare cap. [A] 1.02, range 1.00-1.05.
-        stiffness: Elastic Winkler modulus [Pa/m]. [A] 3e7: what an explicit step of 1 ms carries
-            under a free 68 g plate. It springs back 0.3 mm where DEM gives below 0.06 mm.
-        damping: Viscous part of the contact pressure [Pa s/m]. [A] numerical, below 2 % of the
-            yield pressure at 10 mm/s.
+        stiffness: Elastic Winkler modulus [Pa/m]. [A] 3e7, range 1e7-1.5e8; what a step of 1 ms
+            nearly carries under a free 68 g plate, and bounded where it does not
+            (`cell.soft_jig.stable`). It springs back 0.3 mm where DEM gives below 0.06 mm.
+        damping: Viscous part of the contact pressure and of the friction [Pa s/m]. [A] 1e4,
+            numerical, below 2 % of the yield pressure at 10 mm/s.
+        recovery_time: Of the damper beside the spring [s]: the bed gives back its elastic part in
+            this time and throws nothing off. [A] 50 ms, range 20-200; beads return little energy.
         viscosity: Overstress per plastic sinking speed [Pa s/m]. [A] 5e4, 0.5 kPa at 10 mm/s;
             DEM finds no rate effect at 10-80 mm/s, so keep it small.
         shear_stiffness: Tangential Winkler modulus of the membrane [Pa/m]. [A] 3e7; the 1 mm
@@ -74,6 +77,7 @@ class SoilParameters:
     initial_stretch: float = 1.02
     stiffness: float = 3.0e7
     damping: float = 1.0e4
+    recovery_time: float = 0.050
     viscosity: float = 5.0e4
     shear_stiffness: float = 3.0e7
     surface_friction: float = 0.9
