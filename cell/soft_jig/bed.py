@@ -7,25 +7,24 @@ slider: contact pressure p = k * penetration up to the yield pressure
 
 a bearing capacity with the membrane's tension T, which grows with its stretch (Terzaghi's form).
 Beyond q_y the surface sinks for good, and the displaced volume rises as a collar around the
-contact. Stretch hardening matters: with constant q_y a punch runs away through the bed.
+contact (`cell.soft_jig.collar`). Stretch hardening matters: with constant q_y a punch runs away.
 
-Anything with the methods `inflate`, `press`, `settle`, `jam`, `unjam`, `height_at`, `state` and
-`restore` can take this model's place in `SoftJig`. All quantities are in the jig frame J: z = 0 is
-the top of the base plate.
+All quantities are in the jig frame J: z = 0 is the top of the base plate.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cell.soft_jig.collar import Ledger, rise_weight, shoulder
 from cell.soft_jig.parameters import BagParameters, SoilParameters
 from cell.soft_jig.samples import SurfaceSamples, Underside
-from cell.soft_jig.stable import Carried, largest_stiffness, normal_rows
+from cell.soft_jig.stable import Carried, Springs, cross_matrix, largest_stiffness, normal_rows
 
 Array = NDArray[np.float64]
 Contact = tuple[NDArray[np.int64], Array]
@@ -35,25 +34,7 @@ Contact = tuple[NDArray[np.int64], Array]
 RESELECT_ANGLE = 0.01
 # Share of a cell by which a part moves on before its points change cells; above one half.
 STAY = 0.8
-_SCALARS = (
-    "vacuum",
-    "displaced",
-    "absorbed",
-    "stretch",
-    "tension",
-    "_since_settled",
-)
-
-
-@dataclass(frozen=True)
-class Springs:
-    """The bed under a part: per point a cell, the part's height z over it, arm from P and area."""
-
-    cells: NDArray[np.int64]
-    z: Array
-    arms: Array
-    areas: Array
-    modulus: float
+_SCALARS = ("vacuum", "stretch", "tension", "_since_settled")
 
 
 class Bed:
@@ -85,8 +66,8 @@ class Bed:
         """Blow the bag up: the bare cap again, every imprint gone."""
         self.heights = self._dome.copy()
         self._shrinkage = np.zeros_like(self.heights)
-        self.displaced = 0.0  # Volume waiting to rise as a collar [m3].
-        self.absorbed = 0.0  # Volume taken up by packing slack [m3].
+        self._settled = self.heights  # When the collar was raised last.
+        self.ledger = Ledger()
         self._traction = np.zeros((self.heights.size, 2))
         self._pressure = np.zeros(self.heights.size)
         self._carried: dict[str, Carried] = {}
@@ -101,7 +82,26 @@ class Bed:
     @property
     def volume(self) -> float:
         """Volume under the surface, with what is displaced but has not risen yet [m3]."""
-        return float(self.heights.sum() * self.bag.cell**2 + self.displaced)
+        return float(self.heights.sum() * self.bag.cell**2 + self.ledger.waiting)
+
+    @property
+    def displaced(self) -> float:
+        """Volume that waits to rise as a collar [m3]."""
+        return self.ledger.waiting
+
+    @property
+    def contracted(self) -> float:
+        """Volume by which the vacuum has drawn the surface in [m3]."""
+        return float(self._shrinkage.sum() * self.bag.cell**2)
+
+    @property
+    def packing_fraction(self) -> float:
+        """Share of the bag's volume that is beads; falls as they dilate, rises with the vacuum."""
+        return self.bag.bead_volume / self.volume
+
+    def _displace(self, before: float, heights: Array) -> None:
+        """Book what the surface, whose heights summed up to `before`, has lost to a part."""
+        self.ledger.displace(float(before - heights.sum()) * self.bag.cell**2, self.soil)
 
     def height_at(self, xy: Array) -> Array:
         """Return the surface height at (k, 2) points, bilinear [m]."""
@@ -144,7 +144,7 @@ class Bed:
             self._carried[samples.name] = Carried(V, np.zeros(6), True)
             return np.zeros(3), np.zeros(3)
         arm, area, cells = p_PQ_J[touching], areas[touching], cells[touching]
-        velocity = V_JP[1] + arm @ _cross_matrix(V_JP[0]).T
+        velocity = V_JP[1] + arm @ cross_matrix(V_JP[0]).T
         soften = 1.0
         if inertia is not None:
             # Of all that can touch: a modulus that followed the contact would do work on the part.
@@ -230,7 +230,7 @@ class Bed:
         elastic = np.where(modulus * trial > limit, relaxed, trial)
         before = heights.sum()
         np.minimum.at(heights, cells, springs.z + elastic)
-        self.displaced += float(before - heights.sum()) * self.bag.cell**2
+        self._displace(before, heights)
         # What the latest step has given too much is taken back, once.
         least = -max(float(latest @ springs.areas / springs.areas.sum()), 0.0)
         up, down = np.maximum(rising, 0.0), np.maximum(-rising, 0.0)
@@ -262,26 +262,22 @@ class Bed:
             return
         self._since_settled = 0.0
         if self.displaced > 0:
-            self._take_up_slack()
             self._raise_collar()
+            self._settled = self.heights.copy()
         self._update_yield()
-
-    def _take_up_slack(self) -> None:
-        taken = min(self.displaced, self.soil.packing_slack - self.absorbed)
-        self.absorbed += taken
-        self.displaced -= taken
 
     def underside_over_bed(self, name: str) -> Array:
         """Return the height (n, n) of a part's underside in the latest step; infinite elsewhere."""
-        height = np.full(self.heights.size, np.inf)
-        np.minimum.at(height, *self._ceilings.get(name, (np.zeros(0, dtype=np.int64), np.zeros(0))))
-        return height.reshape(self.heights.shape)
+        return self._lowest([self._ceilings[name]] if name in self._ceilings else [])
 
     def _ceiling(self) -> Array:
-        ceiling = np.full(self.heights.size, np.inf)
-        for flat, z in self._ceilings.values():
-            np.minimum.at(ceiling, flat, z)
-        return ceiling.reshape(self.heights.shape)
+        return self._lowest(self._ceilings.values())
+
+    def _lowest(self, undersides: Iterable[Contact]) -> Array:
+        lowest = np.full(self.heights.size, np.inf)
+        for cells, z in undersides:
+            np.minimum.at(lowest, cells, z)
+        return lowest.reshape(self.heights.shape)
 
     def _raise_collar(self) -> None:
         """Spread the displaced volume around the contact, below whatever hangs over the bed."""
@@ -289,15 +285,19 @@ class Bed:
         touched = ceiling <= self.heights
         if not touched.any():
             return
-        distance = np.asarray(ndimage.distance_transform_edt(~touched)) * self.bag.cell
-        free = ~touched & (self._dome > self.bag.floor)
-        weight = np.where(free, np.exp(-distance / self.soil.collar_length), 0.0)
+        cell = self.bag.cell
+        sunk = np.maximum(self._settled - self.heights, 0.0)
+        drop = shoulder(touched, sunk, self.heights, cell, self.soil)
+        drop = np.minimum(drop, np.maximum(self.heights - self.bag.floor, 0.0))
+        self.heights = self.heights - drop
+        self.ledger.waiting += float(drop.sum()) * cell**2
+        weight = np.where(self._dome > self.bag.floor, rise_weight(touched, cell, self.soil), 0.0)
         for _ in range(4):
             if self.displaced <= 1e-15 or not weight.any():
                 return
-            rise = weight * (self.displaced / (weight.sum() * self.bag.cell**2))
+            rise = weight * (self.displaced / (weight.sum() * cell**2))
             raised = np.minimum(self.heights + rise, np.maximum(ceiling, self.heights))
-            self.displaced -= float((raised - self.heights).sum()) * self.bag.cell**2
+            self.ledger.waiting -= float((raised - self.heights).sum()) * cell**2
             self.heights = raised
             weight = np.where(raised < ceiling, weight, 0.0)
 
@@ -337,7 +337,7 @@ class Bed:
         ceiling = self._ceiling()
         held = ceiling <= self.heights
         conformed = np.where(held, np.maximum(ceiling, self.bag.floor), self.heights)
-        self.displaced += float((self.heights - conformed).sum()) * self.bag.cell**2
+        self._displace(self.heights.sum(), conformed)
         self.heights = conformed
         self._shrinkage = np.where(held, 0.0, contraction * self.heights)
         self.heights = self.heights - self._shrinkage
@@ -356,7 +356,7 @@ class Bed:
         heights = self.heights.reshape(-1)
         before = heights.sum()
         np.minimum.at(heights, cells, np.maximum(z, self.bag.floor))
-        self.displaced += float(before - heights.sum()) * self.bag.cell**2
+        self._displace(before, heights)
 
     def unjam(self) -> None:
         """Let air in again: the shrinkage goes back, the imprint stays."""
@@ -377,6 +377,8 @@ class Bed:
             "yield_pressure": self.yield_pressure.copy(),
             "reference": {name: R_JP.copy() for name, R_JP in self._reference.items()},
             "shifts": {name: shift.copy() for name, shift in self._shifts.items()},
+            "settled": self._settled.copy(),
+            "ledger": self.ledger.array(),
             "scalars": np.array([getattr(self, name) for name in _SCALARS]),
         }
 
@@ -391,10 +393,7 @@ class Bed:
         self.yield_pressure = state["yield_pressure"].copy()
         self._reference = {name: R_JP.copy() for name, R_JP in state.get("reference", {}).items()}
         self._shifts = {name: shift.copy() for name, shift in state.get("shifts", {}).items()}
+        self._settled = state["settled"].copy()
+        self.ledger = Ledger(*map(float, state["ledger"]))
         for name, value in zip(_SCALARS, state["scalars"], strict=True):
             setattr(self, name, float(value))
-
-
-def _cross_matrix(w: Array) -> Array:
-    """Return [w] with [w] v = w x v."""
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])

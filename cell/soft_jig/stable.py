@@ -26,6 +26,26 @@ Array = NDArray[np.float64]
 SAFE = 0.8
 
 
+@dataclass(frozen=True)
+class Springs:
+    """The bed under a part: per point a cell, the part's height z over it, arm from P and area.
+
+    Attributes:
+        modulus: Of all [Pa/m].
+    """
+
+    cells: NDArray[np.int64]
+    z: Array
+    arms: Array
+    areas: Array
+    modulus: float
+
+
+def cross_matrix(w: Array) -> Array:
+    """Return [w] with [w] v = w x v."""
+    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])
+
+
 def normal_rows(arms: Array) -> Array:
     """Return the rows (n, 6) that map a spatial velocity to the upward velocity at arms (n, 3)."""
     zero = np.zeros(len(arms))
@@ -44,7 +64,7 @@ def largest_stiffness(inertia: Array, arms: Array, areas: Array, dt: float) -> f
     # The sum over all three directions of A j j', with j the row that gives a point's velocity.
     first, total = areas @ arms, float(areas.sum())
     second = arms.T @ (areas[:, None] * arms)
-    cross = np.array([[0, -first[2], first[1]], [first[2], 0, -first[0]], [-first[1], first[0], 0]])
+    cross = cross_matrix(first)
     square = np.trace(second) * np.eye(3) - second
     touched = np.block([[square, cross], [cross.T, total * np.eye(3)]])
     stiffest = np.linalg.eigvals(np.linalg.solve(inertia, touched)).real.max()
@@ -86,7 +106,8 @@ class Carried:
         """
         F_spring = rows.T @ spring
         pushed = inertia @ V + dt * (F_spring + self.others(inertia, V, F_spring, dt))
-        return np.linalg.solve(inertia + dt * rows.T @ (damping[:, None] * rows), pushed)
+        damped = inertia + dt * rows.T @ (damping[:, None] * rows)
+        return np.linalg.solve(damped, pushed).astype(float)
 
     def row(self) -> Array:
         """Return everything as one row (13,), for saving."""
