@@ -61,7 +61,6 @@ LINK_MASS = 2.0  # Of each slide [kg] [A].
 CARRIAGE_JOINTS = ("x", "y", "z", "turn", "tilt")
 
 BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
-FLAT_HINT = 0.5  # Two flat faces: few large elements tell as much as many small ones [m] [A].
 RIGID_FRICTION = 0.3  # Metal on metal [A].
 
 
@@ -294,13 +293,12 @@ def _jig_inertia(config: CellConfig) -> SpatialInertia:
 def _set_sliding(
     plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, friction: float
 ) -> None:
-    """Set the friction between base and force plate, and mesh their flat contact coarsely."""
+    """Set the friction between base and force plate."""
     inspector = scene_graph.model_inspector()
     for geometry in plant.GetCollisionGeometriesForBody(body):
         properties = ProximityProperties(inspector.GetProximityProperties(geometry))
         material = CoulombFriction(friction, friction)
         properties.UpdateProperty("material", "coulomb_friction", material)
-        properties.UpdateProperty("hydroelastic", "resolution_hint", FLAT_HINT)
         source = plant.get_source_id()
         scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
 

@@ -48,9 +48,11 @@ RISER_SIZE = (0.26, 0.26, J_HEIGHT + RISER_TOP)
 
 # Rigid: every part that is set down has a compliant side. Friction of metal on metal [A].
 STATIC_CONTACT = Contact("rigid", friction=0.3, hint=0.05)
-# Compliant so that a jig that slides freely rests on a pressed area and not on one point;
-# stiff as hard rubber feet. Friction of the base on the force plate 0.3 [A].
-JIG_CONTACT = Contact("compliant", friction=0.3, modulus=1e8, dissipation=5.0, hint=0.04)
+# Compliant so that a jig that slides freely rests on a pressed area and not on one point; stiff
+# as hard rubber feet. Thirteen sectors: with three it tips over the edges of a triangle [M]. With
+# less dissipation it rocks and slams while it is pushed, by hundreds of newtons [M]. Friction of
+# the base on the force plate 0.3 [A].
+JIG_CONTACT = Contact("compliant", friction=0.3, modulus=1e8, dissipation=100.0, hint=0.04)
 
 
 def table() -> SdfModel:
