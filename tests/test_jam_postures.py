@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from cell import load_product
 from cell.soft_jig import JigState, SurfaceSamples
@@ -59,7 +59,7 @@ def test_imprint_is_the_parts_surface(held) -> None:
     touching &= bed.underside_over_bed("part") < bed.heights + 1e-4
     touched = np.column_stack([bed.x[touching], bed.y[touching], bed.heights[touching]])
     assert len(touched) * bed.bag.cell**2 > 1e-4
-    distance, _ = cKDTree(surface).query(touched)
+    distance, _ = KDTree(surface).query(touched)
     assert np.sqrt(np.mean(distance**2)) < 1e-3
 
 
