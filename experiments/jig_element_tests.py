@@ -1,10 +1,11 @@
 """Element tests of the soft jig against formulas and discrete-element runs.
 
-`python -m experiments.jig_element_tests [--out DIR]` presses a flat punch into the soft bed, and
-drags and pulls a standing cylinder out of the frozen one, over depth and vacuum, vented and sealed.
-It prints a table and writes `element_tests.png` and `element_tests.csv`. One parameter set: the
-defaults. Only what the reference defines otherwise is set: part friction, no suction ("vented") or
-a seal of full vacuum that never opens ("sealed").
+`python -m experiments.jig_element_tests [--out DIR]` presses a flat punch into the soft and into
+the frozen bed, and drags and pulls a standing cylinder out of the frozen one, over depth and
+vacuum, vented and sealed. It prints a table with the reasons of what differs by more than 30 %, and
+writes `element_tests.png`, `.csv` and `.txt`. One parameter set: the defaults. Only what the
+reference defines otherwise is set: part friction, no suction ("vented") or a seal that holds full
+vacuum over all of the flat end and a little beyond, whatever it opens ("sealed").
 """
 
 from __future__ import annotations
@@ -24,6 +25,7 @@ from numpy.typing import NDArray
 
 from cell.soft_jig import JigParameters
 from cell.soft_jig.bed import Bed
+from cell.soft_jig.parameters import FULL_VACUUM
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.yielding import Strength
 from experiments.element_rig import Drag, ElementRig
@@ -36,6 +38,8 @@ DEPTHS = (0.005, 0.010, 0.015)
 # The lowest stands for an open valve: beads held by membrane and weight alone.
 VACUUMS = (1.0, 30e3, 60e3, 90e3)
 PUSH_HEIGHT = 0.040  # Over the bed's apex [m].
+END = np.pi * CYLINDER.radius**2  # Of the cylinder [m2].
+REFERENCE_PRESSURE = 1e3  # On the reference's dome while soft [Pa].
 SIDEWAYS, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
@@ -58,15 +62,39 @@ def reference() -> dict[str, Any]:
 def parameters(vacuum: float = 90e3, sealed: bool = False) -> JigParameters:
     """Return the defaults with a vacuum [Pa] and the reference's limits of the seal."""
     params = JigParameters()
-    perfect = replace(params.suction, strength=90e3, lip=0.0, reach=1.0, slip=1.0)
+    # A bag bridges to a part around its edge: 11.3 cm2 are sucked on under an end of 9.6 cm2.
+    strength = FULL_VACUUM * reference()["sealed_area_ratio"]
+    perfect = replace(params.suction, strength=strength, lip=0.0, reach=1.0, slip=1.0)
     suction = perfect if sealed else replace(params.suction, enabled=False)
     return replace(params, vacuum=replace(params.vacuum, pressure=vacuum), suction=suction)
 
 
-def punch(depth: float = 0.015, speed: float = 0.01, step: float = 1e-3) -> Array:
-    """Press the flat punch into the soft bed; return depth [m] and pressure [Pa] rows (n, 2)."""
+def punch(
+    depth: float = 0.015,
+    speed: float = 0.01,
+    step: float = 1e-3,
+    membrane: bool = True,
+    shoulder: bool = False,
+) -> tuple[Array, Bed]:
+    """Press the flat punch into the soft bed.
+
+    Args:
+        depth: Of the punch in the end [m].
+        speed: Of the punch [m/s].
+        step: [s].
+        membrane: Without it only the beads' weight and the reference's 1 kPa hold the bed.
+        shoulder: Let the bed beside the punch sink as in the reference's dome.
+
+    Returns:
+        Depth [m] and pressure [Pa] rows (n, 2), and the bed.
+    """
     params = JigParameters()
-    bed = Bed(params.bag, params.soil)
+    soil = params.soil
+    if not membrane:
+        soil = replace(soil, membrane_modulus=0.0, gravity_pressure=REFERENCE_PRESSURE)
+    if shoulder:
+        soil = replace(soil, shoulder_share=0.85, collar_place=0.030)
+    bed = Bed(params.bag, soil)
     samples = SurfaceSamples.of("punch", CYLINDER.mesh())
     rows, still = [], np.zeros(3)
     for k in range(round(depth / (speed * step))):
@@ -74,8 +102,20 @@ def punch(depth: float = 0.015, speed: float = 0.01, step: float = 1e-3) -> Arra
         X_JP = (np.eye(3), np.array([0.0, 0.0, bed.bag.cap_height - sunk]))
         force, _ = bed.press(X_JP, (still, np.array([0.0, 0.0, -speed])), samples, step)
         bed.settle(step)
-        rows.append((sunk, force[2] / (np.pi * CYLINDER.radius**2)))
-    return np.array(rows)
+        rows.append((sunk, force[2] / END))
+    return np.array(rows), bed
+
+
+def residual(bed: Bed, depth: float) -> float:
+    """Return the share of a punch's depth [m] that stays in the bed under its middle."""
+    floor = float(bed.height_at(np.zeros((1, 2)))[0])
+    return (bed.bag.cap_height - floor) / depth
+
+
+def frozen_punch() -> Drag:
+    """Push a cylinder that stands 5 mm deep in the frozen bed down, to 0.6 mm."""
+    rig = held(0.005, FULL_VACUUM, sealed=False)
+    return rig.drag(np.array([0.0, 0.0, CYLINDER.length]), -UP, way=0.030, speed=0.05)
 
 
 def held(
@@ -115,64 +155,137 @@ def lateral_formula(depth: float, vacuum: float, sealed: bool) -> float:
     return float(moment / (PUSH_HEIGHT + depth))
 
 
-def compare() -> tuple[list[Row], dict[str, Drag], Array]:
-    """Run every test; return the table, the drags and the punch curve."""
-    data, rows, drags = reference(), [], {}
-    curve = punch()
-    dome = data["dome_punch"]
-    for depth, pressure in zip(dome["depth_mm"], dome["pressure_kPa"], strict=True):
-        ours = float(np.interp(depth / 1e3, *curve.T)) / 1e3
-        rows.append(Row(f"soft punch {depth} mm [kPa]", ours, reference=(pressure, pressure)))
+@dataclass
+class Results:
+    """Table, drags by name, and punch curves by name."""
+
+    rows: list[Row]
+    drags: dict[str, Drag]
+    punches: dict[str, Array]
+
+
+def compare() -> Results:
+    """Run every test."""
+    results = Results([], {}, {})
+    _soft(results)
+    _frozen(results)
     for sealed in (False, True):
-        kind = "sealed" if sealed else "vented"
-        for depth, forces in zip(DEPTHS, data[f"{kind}_lateral"]["force_N"], strict=True):
-            drag = drags[f"{kind} {depth * 1e3:.0f} mm"] = push(depth, sealed=sealed)
-            formula = lateral_formula(depth, 90e3, sealed)
-            name = f"push, {kind}, {depth * 1e3:.0f} mm, 90 kPa [N]"
-            rows.append(Row(name, drag.holding_force, formula, (min(forces), max(forces))))
-        top = data["pull_out"][f"{kind}_N"]
-        ours = pull(DEPTHS[-1], sealed=sealed).holding_force
-        rows.append(Row(f"pull out, {kind}, 15 mm, 90 kPa [N]", ours, reference=(top, top)))
-    for vacuum in VACUUMS[:-1]:
-        ours = push(0.010, vacuum).holding_force
-        name = f"push, vented, 10 mm, {vacuum / 1e3:.0f} kPa [N]"
-        rows.append(Row(name, ours, lateral_formula(0.010, vacuum, False)))
-    return rows, drags, curve
+        for vacuum in VACUUMS:
+            depths = DEPTHS if vacuum == FULL_VACUUM else (0.010,)
+            for depth in depths:
+                _hold(results, depth, vacuum, sealed)
+    return results
 
 
-def plot(drags: dict[str, Drag], curve: Array) -> Figure:
-    """Draw the punch curve and the pushes beside the reference."""
-    data, figure = reference(), Figure(figsize=(10, 4), layout="constrained")
-    left, right = figure.subplots(1, 2)
-    left.plot(curve[:, 0] * 1e3, curve[:, 1] / 1e3, label="bed with membrane")
-    dome = data["dome_punch"]
-    left.plot(dome["depth_mm"], dome["pressure_kPa"], "k.", label="discrete elements, no membrane")
-    left.set(xlabel="depth [mm]", ylabel="pressure [kPa]", title="flat punch, soft")
-    for k, (name, drag) in enumerate(drags.items()):
-        right.plot(drag.way * 1e3, drag.force, color=f"C{k}", label=name)
-        kind, depth, _ = name.split()
-        forces = data[f"{kind}_lateral"]["force_N"][[5, 10, 15].index(int(depth))]
-        right.plot([6.3] * len(forces), forces, ".", color=f"C{k}")
-    right.set(
-        xlabel="displacement [mm]", ylabel="force [N]", title="push at 90 kPa; dots: reference"
+def _soft(results: Results) -> None:
+    dome = reference()["dome_punch"]
+    kinds = {
+        "with membrane": {},
+        "without membrane": {"membrane": False},
+        "with membrane, sinking shoulder": {"shoulder": True},
+    }
+    for kind, options in kinds.items():
+        curve, bed = punch(**options)
+        results.punches[kind] = curve
+        for depth, pressure in zip(dome["depth_mm"], dome["pressure_kPa"], strict=True):
+            ours = float(np.interp(depth / 1e3, *curve.T)) / 1e3
+            name = f"soft punch {depth} mm, {kind} [kPa]"
+            results.rows.append(Row(name, ours, reference=(pressure, pressure)))
+    kept = residual(bed, float(curve[-1, 0]))
+    back = reference()["spring_back_mm"] / 15
+    results.rows.append(Row("imprint left of 15 mm [-]", kept, reference=(1 - back, 1 - back)))
+
+
+def _frozen(results: Results) -> None:
+    bearing = Strength.of(JigParameters().soil, FULL_VACUUM).bearing * END
+    force = frozen_punch().force.max()
+    results.rows.append(Row("frozen punch, largest load without punching through [N]", force))
+    results.rows.append(Row("frozen punch, c Nc A [N]", bearing, bearing))
+
+
+def _hold(results: Results, depth: float, vacuum: float, sealed: bool) -> None:
+    data, kind = reference(), "sealed" if sealed else "vented"
+    case = f"{kind}, {depth * 1e3:.0f} mm, {vacuum / 1e3:.0f} kPa"
+    drag = results.drags[f"push, {case}"] = push(depth, vacuum, sealed)
+    full = vacuum == FULL_VACUUM
+    none = [float("nan")]
+    known = data[f"{kind}_lateral"]["force_N"][DEPTHS.index(depth)] if full else none
+    formula = lateral_formula(depth, vacuum, sealed)
+    span = (min(known), max(known))
+    results.rows.append(Row(f"push, {case} [N]", drag.holding_force, formula, span))
+    moment = drag.holding_force * (PUSH_HEIGHT + depth)
+    net = moment - CYLINDER.mass * 9.81 * CYLINDER.radius
+    results.rows.append(Row(f"push, {case}: moment less the weight's own [N m]", net))
+    drag = results.drags[f"pull, {case}"] = pull(depth, vacuum, sealed)
+    known = [data["pull_out"][f"{kind}_N"]] if full and depth == DEPTHS[-1] else none
+    results.rows.append(
+        Row(f"pull, {case} [N]", drag.holding_force, reference=(known[0], known[0]))
     )
-    left.legend()
-    right.legend()
+
+
+def plot(results: Results) -> Figure:
+    """Draw the punch curves and the pushes beside the reference."""
+    data, figure = reference(), Figure(figsize=(12, 8), layout="constrained")
+    axes = figure.subplots(2, 2)
+    for name, curve in results.punches.items():
+        axes[0, 0].plot(curve[:, 0] * 1e3, curve[:, 1] / 1e3, label=name)
+    dome = data["dome_punch"]
+    axes[0, 0].plot(dome["depth_mm"], dome["pressure_kPa"], "k.", label="discrete elements")
+    axes[0, 0].set(xlabel="depth [mm]", ylabel="pressure [kPa]", title="flat punch, soft")
+    for axis, kind in ((axes[0, 1], "push, vented"), (axes[1, 0], "push, sealed")):
+        for k, depth in enumerate(DEPTHS):
+            drag = results.drags[f"{kind}, {depth * 1e3:.0f} mm, 90 kPa"]
+            axis.plot(drag.way * 1e3, drag.force, color=f"C{k}", label=f"{depth * 1e3:.0f} mm")
+            known = data[f"{kind.split()[1]}_lateral"]["force_N"][k]
+            axis.plot([6.3] * len(known), known, ".", color=f"C{k}")
+        axis.set(xlabel="displacement [mm]", ylabel="force [N]", title=f"{kind}, 90 kPa; dots: DEM")
+    for kind in ("push, vented", "push, sealed", "pull, vented", "pull, sealed"):
+        names = [f"{kind}, 10 mm, {vacuum / 1e3:.0f} kPa" for vacuum in VACUUMS]
+        forces = [results.drags[name].holding_force for name in names]
+        axes[1, 1].plot(np.array(VACUUMS) / 1e3, forces, ".-", label=kind)
+    axes[1, 1].set(xlabel="vacuum [kPa]", ylabel="holding force [N]", title="10 mm deep")
+    axes[1, 1].set_yscale("log")
+    for axis in axes.flat:
+        axis.legend(fontsize="small")
     return figure
+
+
+REASONS = """Differences beyond 30 %:
+- Soft punch: the reference has no membrane; ours stretches and stiffens with depth. Without it the
+  curves agree within 30 %.
+- Vented pushes: forces of 1 to 4 N, which scatter up to six times between the reference's packings.
+  Ours grow with the imprint's wall (passive wedge). In the reference's dome the ground beside the
+  cylinder sinks with it and leaves 4 to 7 mm of wall at 10 to 15 mm of depth, for which the formula
+  gives 1.3 and 2.7 N; `jig.soil.shoulder_share` 0.85 lets it sink here.
+- Vented pull: the reference's 2 N (the weight) is of its rigid cup, whose dent opens on evacuation;
+  in a dome it closes by 0.05 mm in diameter, as here, and friction on that is the difference.
+- Sealed pushes: the reference fails at 2 to 3 mm, ours still rises at 6: the frozen bed is softer
+  (E50 10 MPa; the reference, an upper bound, 33), and its pressure falls off towards the edge of
+  the floor's columns, where the tilting end presses most.
+- Sealed pull: the reference has 41 N of friction on sides that are sealed as well (0.28 of the
+  vacuum as shear); suction here acts on flat faces only.
+- At 0 kPa the weight alone turns back 0.034 N m: compare the moments less the weight's own.
+"""
 
 
 def main(out: Path = Path("out/element_tests")) -> None:
     """Run the element tests, print the table and write it with the plot into a folder."""
     out.mkdir(parents=True, exist_ok=True)
-    rows, drags, curve = compare()
+    results = compare()
     with (out / "element_tests.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["test", "ours", "formula", "reference_low", "reference_high"])
-        writer.writerows((row.name, row.ours, row.formula, *row.reference) for row in rows)
-    for row in rows:
+        writer.writerows((r.name, r.ours, r.formula, *r.reference) for r in results.rows)
+    lines = [f"{'':58s} {'ours':>8s}  {'formula':>8s}  {'reference':>8s}"]
+    for row in results.rows:
         low, high = row.reference
-        print(f"{row.name:36s} {row.ours:8.2f}  {row.formula:8.2f}  {low:8.2f} .. {high:.2f}")
-    FigureCanvasAgg(figure := plot(drags, curve))
+        lines.append(
+            f"{row.name:58s} {row.ours:8.3g}  {row.formula:8.3g}  {low:8.3g} .. {high:.3g}"
+        )
+    text = "\n".join(lines) + "\n\n" + REASONS
+    print(text)
+    (out / "element_tests.txt").write_text(text, encoding="utf-8")
+    FigureCanvasAgg(figure := plot(results))
     figure.savefig(out / "element_tests.png", dpi=110)
 
 

@@ -10,6 +10,7 @@ import trimesh
 from numpy.typing import NDArray
 
 from cell.soft_jig.bed import Bed
+from cell.soft_jig.collar import steepest_wall
 from cell.soft_jig.parameters import BagParameters, SoilParameters
 from cell.soft_jig.samples import SurfaceSamples
 
@@ -63,35 +64,137 @@ def test_samples_have_the_projected_area_of_the_surface(punch: SurfaceSamples) -
     assert area == pytest.approx(np.pi * PUNCH_RADIUS**2, rel=0.01)
 
 
+def balance(bed: Bed) -> float:
+    """Return what is missing from the bare cap's volume when all that is booked counts [m3]."""
+    booked = bed.ledger.dilated - bed.ledger.absorbed - bed.contracted
+    return float(new_bed().volume) + booked - bed.volume
+
+
 def test_pressing_conserves_volume(punch: SurfaceSamples) -> None:
-    """What sinks under the punch rises as a collar, to rounding."""
+    """What sinks under the punch rises as a collar with what the beads dilate, to rounding."""
     bed = new_bed()
-    before = bed.volume
     sink(bed, punch, 0.012)
-    assert bed.volume == pytest.approx(before, rel=1e-12)
-    assert bed.heights.max() > bed.bag.cap_height - 0.012 + 0.003
+    assert balance(bed) == pytest.approx(0.0, abs=1e-12)
+    stiff = new_bed(dilation_limit=0.0)
+    sink(stiff, punch, 0.012)
+    assert stiff.volume == pytest.approx(new_bed().volume, rel=1e-12)
+
+
+def test_volume_balance_closes_from_inflation_to_release(punch: SurfaceSamples) -> None:
+    """Inflate, press, jam, release, inflate: collar, slack, dilation, contraction; 1 % at most."""
+    bed = new_bed(packing_slack=1e-6)
+    worst = []
+    for stage in ("press", "jam", "push", "release", "inflate"):
+        if stage == "press":
+            sink(bed, punch, 0.012)
+        elif stage == "jam":
+            bed.jam(0.004)
+            assert bed.contracted > 0.5e-6
+        elif stage == "push":  # The part pushes the frozen bed aside.
+            bed.conform((UPRIGHT, np.array([0, 0, 0.033])), punch)
+        elif stage == "release":
+            bed.unjam()
+        else:
+            bed.inflate()
+        worst.append(abs(balance(bed)) / bed.bag.volume)
+    assert max(worst) < 0.01
+
+
+def test_beads_lie_looser_where_they_were_sheared_and_tighter_under_vacuum(
+    punch: SurfaceSamples,
+) -> None:
+    """Packing fraction 0.61 on the bare cap; 1 to 2 % less volume of beads after 10 mm."""
+    bed = new_bed()
+    rest = bed.packing_fraction
+    assert rest == pytest.approx(0.608, abs=0.004)
+    sink(bed, punch, 0.010)
+    pressed = bed.packing_fraction
+    assert 0.010 < rest / pressed - 1 < 0.020
+    bed.jam(0.004)
+    assert bed.packing_fraction > pressed
+
+
+def test_collar_against_the_discrete_elements(punch: SurfaceSamples) -> None:
+    """Raised over displaced volume, height over displaced volume, and place, within 30 %.
+
+    The reference is a rigid cup of 50 mm: a flat bed, whose punch displaces more at equal depth
+    than on our dome. So heights are compared per displaced volume.
+    """
+    heights_mm, swept_cm3 = (1.94, 3.30, 4.34), (4.81, 9.62, 14.4)
+    for depth, height, swept, ratio in zip(
+        (0.005, 0.010, 0.015), heights_mm, swept_cm3, (1.75, 1.57, 1.43), strict=True
+    ):
+        bed = new_bed()
+        sink(bed, punch, depth)
+        ledger = bed.ledger
+        assert 1 + ledger.dilated / ledger.swept == pytest.approx(ratio, rel=0.1)
+        rise = bed.heights - new_bed().heights
+        top = np.unravel_index(np.argmax(rise), rise.shape)
+        assert rise.max() / ledger.swept == pytest.approx(height / swept * 1e3, rel=0.3)
+        beside = np.hypot(bed.x, bed.y)[top] - PUNCH_RADIUS
+        assert beside == pytest.approx(0.016, rel=0.3)
+
+
+def test_shoulder_sinks_beside_the_part_as_in_a_free_dome(punch: SurfaceSamples) -> None:
+    """Share 0.85, DEM dome at 15 mm: -8.4 / -5.6 / -4.0 mm at 19 / 21 / 23 mm; balance kept."""
+    bed = new_bed(shoulder_share=0.85, collar_place=0.030)
+    sink(bed, punch, 0.015)
+    fall = (new_bed().heights - bed.heights) * 1e3
+    radius = np.hypot(bed.x, bed.y) * 1e3
+    for at, expected in ((19, 8.4), (21, 5.6), (23, 4.0)):
+        assert fall[np.abs(radius - at) < 1].mean() == pytest.approx(expected, rel=0.3)
+    assert balance(bed) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_upright_walls_stand_under_the_membrane(punch: SurfaceSamples) -> None:
+    """A cut of 30 mm stands under membrane and weight; under a tenth of the weight alone not."""
+    soil = SoilParameters()
+    assert steepest_wall(new_bed().confinement, soil) > 0.030
+    assert steepest_wall(soil.gravity_pressure / 10, soil) < 0.015
 
 
 def test_packing_slack_is_the_most_that_can_vanish(punch: SurfaceSamples) -> None:
     """With slack the collar starts later, and no more than the slack is lost."""
     slack = 2e-6
-    bed = new_bed(packing_slack=slack)
+    bed = new_bed(packing_slack=slack, dilation_limit=0.0)
     before = bed.volume
     sink(bed, punch, 0.012)
     assert before - bed.volume == pytest.approx(slack, rel=1e-9)
 
 
+def test_imprint_stays_when_the_part_is_lifted_and_a_second_part_adds_its_own(
+    punch: SurfaceSamples,
+) -> None:
+    """80 % of the indentation and more remain; then another part presses beside the first."""
+    bed = new_bed()
+    sink(bed, punch, 0.010)
+    for k in range(200):
+        press_at(bed, punch, [0, 0, 0.0359 + k * 1e-4], [0, 0, 0.1])
+    floor = float(bed.height_at(np.zeros((1, 2)))[0])
+    assert bed.bag.cap_height - floor > 0.8 * 0.010
+    small = trimesh.creation.cylinder(radius=0.006, height=0.03, sections=32)
+    small.apply_translation([0, 0, 0.015])
+    second = SurfaceSamples.of("second", small)
+    for k in range(400):
+        press_at(bed, second, [0.030, 0, 0.045 - k * 4e-5], [0, 0, -0.04])
+    assert bed.height_at(np.array([[0.030, 0.0]]))[0] == pytest.approx(0.029, abs=1e-3)
+    # Its collar fills the first imprint by little.
+    assert bed.height_at(np.zeros((1, 2)))[0] == pytest.approx(floor, abs=1.5e-3)
+    bed.inflate()
+    assert bed.heights == pytest.approx(new_bed().heights, abs=1e-12)
+
+
 def test_punch_pressure_against_the_references(punch: SurfaceSamples) -> None:
     """Stretch hardening carries 20 N; beads alone match the order of the DEM dome.
 
-    The quasi-static reference gives 5 / 10 / 20 N at 1.6 / 3.1 / 7.6 mm; 1.5 mm cells cost up to
-    35 % in depth. DEM has no membrane: 8 kPa at 3 mm is a lower bound.
+    A quasi-static prototype gives 5 / 10 / 20 N at 1.6 / 3.1 / 7.6 mm. Its collar stands at the
+    rim, ours 16 mm from it, where it stretches the membrane less: up to 65 % deeper. DEM has no
+    membrane: 8 kPa at 3 mm is a lower bound.
     """
     depth, force = sink(new_bed(), punch, 0.014).T
     at = {f: depth[np.argmax(force >= f)] * 1e3 for f in (5, 10, 20)}
-    assert at[5] == pytest.approx(1.6, rel=0.35)
-    assert at[10] == pytest.approx(3.1, rel=0.35)
-    assert at[20] == pytest.approx(7.6, rel=0.35)
+    for load, depth_mm in ((5, 1.6), (10, 3.1), (20, 7.6)):
+        assert depth_mm < at[load] < 1.65 * depth_mm
     pressure = force / (np.pi * PUNCH_RADIUS**2)
     assert pressure[np.argmax(depth >= 0.003)] > 8e3
 

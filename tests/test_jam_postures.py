@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.spatial import KDTree
 
 from cell import load_product
-from cell.soft_jig import JigState
+from cell.soft_jig import JigState, SurfaceSamples
 from experiments.element_rig import ElementRig
 from experiments.specimens import ProductPart
 
@@ -46,3 +47,33 @@ def test_part_is_let_go_without_a_kick(held) -> None:
     assert kick < 0.3e-3
     assert fastest < 20e-3
     assert last < 1e-3
+
+
+def test_imprint_is_the_parts_surface(held) -> None:
+    """Where they touch, the bed is within 1 mm RMS of the real mesh (pins, boss, foot)."""
+    rig, *_ = held
+    samples = SurfaceSamples.of("surface", rig.part.mesh(), spacing=0.0005)
+    surface = (rig.X_JP @ samples.points.T).T
+    bed = rig.jig.bed
+    touching = np.isfinite(rig.jig.bed.underside_over_bed("part"))
+    touching &= bed.underside_over_bed("part") < bed.heights + 1e-4
+    touched = np.column_stack([bed.x[touching], bed.y[touching], bed.heights[touching]])
+    assert len(touched) * bed.bag.cell**2 > 1e-4
+    distance, _ = KDTree(surface).query(touched)
+    assert np.sqrt(np.mean(distance**2)) < 1e-3
+
+
+def test_part_rests_in_the_imprint(held) -> None:
+    """Under its weight it sinks less than 0.3 mm into the frozen bed: the contact's mean depth."""
+    rig, *_ = held
+    results = rig.plant.get_contact_results_output_port().Eval(rig.context)
+    depths, areas = [], []
+    for i in range(results.num_hydroelastic_contacts()):
+        surface = results.hydroelastic_contact_info(i).contact_surface()
+        mesh, field = surface.poly_mesh_W(), surface.poly_e_MN()
+        for face in range(mesh.num_faces()):
+            pressure = field.EvaluateCartesian(face, mesh.element_centroid(face))
+            depths.append(pressure / rig.params.jammed.pressure_gradient)
+            areas.append(mesh.area(face))
+    assert 0 < np.average(depths, weights=areas) < 0.3e-3
+    assert np.average(np.array(depths) < 0.3e-3, weights=areas) > 0.9

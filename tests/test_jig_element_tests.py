@@ -5,7 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.jig_element_tests import CYLINDER, Row, held, lateral_formula, punch, reference
+from experiments.jig_element_tests import (
+    CYLINDER,
+    Row,
+    held,
+    lateral_formula,
+    punch,
+    reference,
+    residual,
+)
 from experiments.jig_element_tests import UP as Z
 
 
@@ -25,11 +33,20 @@ def test_formula_is_the_statics_of_the_standing_cylinder() -> None:
 
 def test_soft_bed_is_stiffer_than_beads_without_a_membrane() -> None:
     """The reference has no membrane: a lower bound, and within a factor of four."""
-    curve = punch(0.010, step=2e-3)
+    curve, _ = punch(0.010, step=2e-3)
     dome = reference()["dome_punch"]
     for depth, pressure in zip(dome["depth_mm"][2:8], dome["pressure_kPa"][2:8], strict=True):
         ours = np.interp(depth / 1e3, *curve.T) / 1e3
         assert 0.9 * pressure < ours < 4 * pressure
+
+
+def test_without_membrane_the_bed_bears_as_the_beads_do() -> None:
+    """Within 30 % of the reference's mean from 3 to 10 mm, whose points scatter; imprints stay."""
+    curve, bed = punch(0.010, step=2e-3, membrane=False)
+    dome = reference()["dome_punch"]
+    ours = [np.interp(depth / 1e3, *curve.T) / 1e3 for depth in dome["depth_mm"][2:8]]
+    assert np.mean(ours) == pytest.approx(np.mean(dome["pressure_kPa"][2:8]), rel=0.3)
+    assert residual(bed, 0.010) > 0.9
 
 
 @pytest.fixture(scope="module")
@@ -46,7 +63,7 @@ def pulls() -> dict[bool, float]:
 def test_seal_decides_the_pull_out(pulls: dict[bool, float]) -> None:
     """Vented little more than the weight of 2 N; sealed at least the suction, 87 N, more."""
     assert pulls[False] < 8.0
-    assert pulls[True] - pulls[False] == pytest.approx(90e3 * np.pi * 0.0175**2, rel=0.3)
+    assert pulls[True] - pulls[False] == pytest.approx(90e3 * 11.3e-4, rel=0.3)
 
 
 def test_row_without_reference_says_so() -> None:

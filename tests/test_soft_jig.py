@@ -90,16 +90,21 @@ def test_frozen_bed_carries_the_part_at_rest(held: Held) -> None:
 
 
 def test_bed_keeps_its_volume(held: Held) -> None:
-    """No slack is declared: nothing is lost but the contraction when frozen."""
+    """Collar, dilation and contraction account for it from inflation to the frozen bed."""
     bed = held.rig.jig.bed
     rest = type(bed)(bed.bag, bed.soil).volume
-    assert held.pressed_volume == pytest.approx(rest, rel=1e-9)
-    assert rest * (1 - held.rig.params.vacuum.contraction) * 0.999 < bed.volume < rest
+    assert held.pressed_volume == pytest.approx(rest + bed.ledger.dilated, rel=0.01)
+    assert bed.volume == pytest.approx(rest + bed.ledger.dilated - bed.contracted, rel=1e-9)
+    assert bed.contracted < 1.01 * held.rig.params.vacuum.contraction * bed.volume
 
 
 def test_pressed_depth_is_in_the_range_of_the_references(held: Held) -> None:
-    """22 N (20 N and the motor's weight) sink the can 8.5 mm quasi-statically, 14 mm at 30 N."""
-    assert 7e-3 < held.rig.depth < 14e-3
+    """22 N (20 N and the motor's weight) on the can.
+
+    A quasi-static prototype with its collar at the rim, which stretches the membrane most, sinks
+    8.5 mm; the discrete elements, which have no membrane, bear no more than 11 N at 14.5 mm.
+    """
+    assert 8.5e-3 < held.rig.depth < 20e-3
 
 
 def test_half_the_step_gives_the_same_depth() -> None:

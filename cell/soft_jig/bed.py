@@ -7,23 +7,24 @@ slider: contact pressure p = k * penetration up to the yield pressure
 
 a bearing capacity with the membrane's tension T, which grows with its stretch (Terzaghi's form).
 Beyond q_y the surface sinks for good, and the displaced volume rises as a collar around the
-contact. Stretch hardening matters: with constant q_y a punch runs away through the bed.
+contact (`cell.soft_jig.collar`). Stretch hardening matters: with constant q_y a punch runs away.
 
-Anything with the methods `inflate`, `press`, `settle`, `jam`, `unjam`, `height_at`, `state` and
-`restore` can take this model's place in `SoftJig`. All quantities are in the jig frame J: z = 0 is
-the top of the base plate.
+All quantities are in the jig frame J: z = 0 is the top of the base plate.
 """
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy import ndimage
 
+from cell.soft_jig.collar import Ledger, rise_weight, shoulder
 from cell.soft_jig.parameters import BagParameters, SoilParameters
 from cell.soft_jig.samples import SurfaceSamples, Underside
+from cell.soft_jig.stable import Carried, Springs, cross_matrix, largest_stiffness, normal_rows
 
 Array = NDArray[np.float64]
 Contact = tuple[NDArray[np.int64], Array]
@@ -31,14 +32,9 @@ Contact = tuple[NDArray[np.int64], Array]
 # Rotation after which the visible underside of a part is selected anew [rad]: the selection only
 # decides which points stand for the surface, one per cell, so a fraction of a cell does not matter.
 RESELECT_ANGLE = 0.01
-_SCALARS = (
-    "vacuum",
-    "displaced",
-    "absorbed",
-    "stretch",
-    "tension",
-    "_since_settled",
-)
+# Share of a cell by which a part moves on before its points change cells; above one half.
+STAY = 0.8
+_SCALARS = ("vacuum", "stretch", "tension", "_since_settled")
 
 
 class Bed:
@@ -70,10 +66,13 @@ class Bed:
         """Blow the bag up: the bare cap again, every imprint gone."""
         self.heights = self._dome.copy()
         self._shrinkage = np.zeros_like(self.heights)
-        self.displaced = 0.0  # Volume waiting to rise as a collar [m3].
-        self.absorbed = 0.0  # Volume taken up by packing slack [m3].
+        self._settled = self.heights  # When the collar was raised last.
+        self.ledger = Ledger()
         self._traction = np.zeros((self.heights.size, 2))
+        self._pressure = np.zeros(self.heights.size)
+        self._carried: dict[str, Carried] = {}
         self._reference: dict[str, Array] = {}  # Orientation at which an underside was selected.
+        self._shifts: dict[str, Array] = {}  # Of its points, in cells.
         self._undersides: dict[str, Underside] = {}
         self._ceilings: dict[str, Contact] = {}  # Undersides over the bed in the latest step.
         self._step_done = False
@@ -83,7 +82,26 @@ class Bed:
     @property
     def volume(self) -> float:
         """Volume under the surface, with what is displaced but has not risen yet [m3]."""
-        return float(self.heights.sum() * self.bag.cell**2 + self.displaced)
+        return float(self.heights.sum() * self.bag.cell**2 + self.ledger.waiting)
+
+    @property
+    def displaced(self) -> float:
+        """Volume that waits to rise as a collar [m3]."""
+        return self.ledger.waiting
+
+    @property
+    def contracted(self) -> float:
+        """Volume by which the vacuum has drawn the surface in [m3]."""
+        return float(self._shrinkage.sum() * self.bag.cell**2)
+
+    @property
+    def packing_fraction(self) -> float:
+        """Share of the bag's volume that is beads; falls as they dilate, rises with the vacuum."""
+        return self.bag.bead_volume / self.volume
+
+    def _displace(self, before: float, heights: Array) -> None:
+        """Book what the surface, whose heights summed up to `before`, has lost to a part."""
+        self.ledger.displace(float(before - heights.sum()) * self.bag.cell**2, self.soil)
 
     def height_at(self, xy: Array) -> Array:
         """Return the surface height at (k, 2) points, bilinear [m]."""
@@ -98,6 +116,7 @@ class Bed:
         V_JP: tuple[Array, Array],
         samples: SurfaceSamples,
         dt: float,
+        inertia: Array | None = None,
     ) -> tuple[Array, Array]:
         """Push a part into the bed for one step.
 
@@ -106,6 +125,9 @@ class Bed:
             V_JP: Angular (3,) [rad/s] and linear (3,) [m/s] velocity of the part's origin.
             samples: The part's surface.
             dt: Step [s].
+            inertia: (6, 6) spatial inertia about the part's origin in J, angular part first, of a
+                part that moves under the returned force; None if its motion is prescribed. The
+                force is then kept within what the step can carry (`cell.soft_jig.stable`).
 
         Returns:
             Force (3,) [N] on the part and torque (3,) [N m] about its origin, in J.
@@ -116,16 +138,30 @@ class Bed:
         p_PQ_J, z, areas, cells = self._points_over_bed(X_JP, samples)
         self._ceilings[samples.name] = (cells, z)
         touching = np.flatnonzero(z < self.heights.reshape(-1)[cells])
+        V = np.concatenate(V_JP)
+        carried = self._carried.setdefault(samples.name, Carried())
         if len(touching) == 0:
+            self._carried[samples.name] = Carried(V, np.zeros(6), True)
             return np.zeros(3), np.zeros(3)
         arm, area, cells = p_PQ_J[touching], areas[touching], cells[touching]
-        velocity = V_JP[1] + arm @ _cross_matrix(V_JP[0]).T
-        pressure = self._sink(cells, z[touching], velocity[:, 2], dt)
-        traction = self._drag(cells, pressure, velocity[:, :2], dt)
+        velocity = V_JP[1] + arm @ cross_matrix(V_JP[0]).T
+        soften = 1.0
+        if inertia is not None:
+            # Of all that can touch: a modulus that followed the contact would do work on the part.
+            most = largest_stiffness(inertia, p_PQ_J, areas, dt)
+            soften = min(1.0, most / max(self.soil.stiffness, self.soil.shear_stiffness))
+        springs = Springs(cells, z[touching], arm, area, soften * self.soil.stiffness)
+        rising = velocity[:, 2]
+        if inertia is not None:
+            rising = self._rising(springs, carried, inertia, V, dt)
+        pressure = self._sink(springs, rising, dt)
+        traction = self._drag(springs, pressure, velocity[:, :2], dt)
         force = np.column_stack([traction, pressure]) * area[:, None]
         moment = arm.T @ force
         torque = np.array([moment[k - 2, k - 1] - moment[k - 1, k - 2] for k in range(3)])
-        return force.sum(axis=0), torque
+        total = force.sum(axis=0)
+        self._carried[samples.name] = Carried(V, np.concatenate([torque, total]), True)
+        return total, torque
 
     def _points_over_bed(
         self, X_JP: tuple[Array, Array], samples: SurfaceSamples
@@ -135,8 +171,7 @@ class Bed:
         under = self._underside(R_JP, samples)
         p_PQ_J = under.points @ R_JP.T
         n = len(self.axis)
-        # One whole-cell shift for the part: its bins then cover the cells without gap or overlap.
-        shift = np.rint((p_JP[:2] - self.axis[0]) / self.bag.cell)
+        shift = self._shift_of(samples.name, p_JP[:2])
         # The grid's border lies outside the aperture: clipping drops points, it does not move them.
         column = np.clip(under.bins + shift, 0, n - 1).astype(np.int64)
         flat = column[:, 0] * n + column[:, 1]
@@ -144,6 +179,19 @@ class Bed:
         to_center = self.axis[0] + column * self.bag.cell - p_JP[:2] - p_PQ_J[:, :2]
         z = p_PQ_J[:, 2] + p_JP[2] + np.einsum("ij,ij->i", under.slopes, to_center)
         return p_PQ_J[keep], z[keep], under.areas[keep], flat[keep]
+
+    def _shift_of(self, name: str, p_JP: Array) -> Array:
+        """Return by how many cells (2,) a part is shifted.
+
+        One whole-cell shift for the part: its bins then cover the cells without gap or overlap. It
+        is kept until the part is clearly in the next cell: a border that jumps into the wall and
+        back as the part rocks would keep it rocking.
+        """
+        exact = (p_JP - self.axis[0]) / self.bag.cell
+        shift = self._shifts.get(name)
+        if shift is None or np.abs(exact - shift).max() > STAY:
+            shift = self._shifts[name] = np.rint(exact)
+        return shift
 
     def _underside(self, R_JP: Array, samples: SurfaceSamples) -> Underside:
         name = samples.name
@@ -155,28 +203,54 @@ class Bed:
             self._undersides[name] = samples.underside(reference, self.bag.cell)
         return self._undersides[name]
 
-    def _sink(self, cells: NDArray[np.int64], z: Array, speed: Array, dt: float) -> Array:
-        """Return the contact pressure per point [Pa] and lower the cells that yield."""
-        soil, heights = self.soil, self.heights.reshape(-1)
-        trial = heights[cells] - z
-        limit = self.yield_pressure.reshape(-1)[cells]
-        # Backward Euler on the viscous overstress: stable for any viscosity and step.
-        relaxed = (trial + dt * limit / soil.viscosity) / (1 + dt * soil.stiffness / soil.viscosity)
-        elastic = np.where(soil.stiffness * trial > limit, relaxed, trial)
-        before = heights.sum()
-        np.minimum.at(heights, cells, z + elastic)
-        self.displaced += float(before - heights.sum()) * self.bag.cell**2
-        return np.maximum(soil.stiffness * elastic - soil.damping * speed, 0.0)
+    def _rising(
+        self, springs: Springs, carried: Carried, inertia: Array, V: Array, dt: float
+    ) -> Array:
+        """Return how fast the points will rise after the step, those that rise now (m,) [m/s]."""
+        rows = normal_rows(springs.arms)
+        elastic = springs.modulus * (self.heights.reshape(-1)[springs.cells] - springs.z)
+        limit = self.yield_pressure.reshape(-1)[springs.cells]
+        damping = np.where(elastic < limit, springs.modulus * self.soil.recovery_time, 0.0)
+        spring = np.minimum(elastic, limit) * springs.areas
+        ahead = carried.ahead(inertia, rows, spring, damping * springs.areas, V, dt)
+        # A point that has stopped rising is carried at once: no lag lets a heavy hand fall in.
+        return np.minimum(rows @ ahead, rows @ V)
 
-    def _drag(self, cells: NDArray[np.int64], pressure: Array, slip: Array, dt: float) -> Array:
+    def _sink(self, springs: Springs, rising: Array, dt: float) -> Array:
+        """Return the contact pressure per point [Pa] and lower the cells that yield.
+
+        A spring and a viscoplastic slider in series, by backward Euler: stable for any viscosity
+        and step. Where the part rises, a damper takes away what the spring would throw back.
+        """
+        soil, cells, modulus = self.soil, springs.cells, springs.modulus
+        heights, latest = self.heights.reshape(-1), self._pressure[cells]
+        trial = heights[cells] - springs.z
+        limit = self.yield_pressure.reshape(-1)[cells]
+        relaxed = (trial + dt * limit / soil.viscosity) / (1 + dt * modulus / soil.viscosity)
+        elastic = np.where(modulus * trial > limit, relaxed, trial)
+        before = heights.sum()
+        np.minimum.at(heights, cells, springs.z + elastic)
+        self._displace(before, heights)
+        # What the latest step has given too much is taken back, once.
+        least = -max(float(latest @ springs.areas / springs.areas.sum()), 0.0)
+        up, down = np.maximum(rising, 0.0), np.maximum(-rising, 0.0)
+        damped = modulus * (elastic - soil.recovery_time * up) + soil.damping * down
+        pressure = np.maximum(damped, least)
+        self._pressure[:] = 0.0
+        self._pressure[cells] = pressure
+        return pressure
+
+    def _drag(self, springs: Springs, pressure: Array, slip: Array, dt: float) -> Array:
         """Return the membrane's friction per point (m, 2) [Pa]: a spring that slips (Coulomb)."""
-        trial = self._traction[cells] - self.soil.shear_stiffness * dt * slip
+        soil, cells = self.soil, springs.cells
+        stretched = springs.modulus * soil.shear_stiffness / soil.stiffness * dt * slip
+        trial = self._traction[cells] - stretched
         size = np.sqrt(np.einsum("ij,ij->i", trial, trial))
-        limit = self.soil.surface_friction * pressure
+        limit = soil.surface_friction * np.maximum(pressure, 0.0)
         trial *= np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
         self._traction[:] = 0.0  # A cell that lost contact forgets its traction.
         self._traction[cells] = trial
-        return trial
+        return trial - soil.damping * slip * (limit > 0)[:, None]
 
     # The slow part: collar, stretch, yield pressure.
 
@@ -188,26 +262,22 @@ class Bed:
             return
         self._since_settled = 0.0
         if self.displaced > 0:
-            self._take_up_slack()
             self._raise_collar()
+            self._settled = self.heights.copy()
         self._update_yield()
-
-    def _take_up_slack(self) -> None:
-        taken = min(self.displaced, self.soil.packing_slack - self.absorbed)
-        self.absorbed += taken
-        self.displaced -= taken
 
     def underside_over_bed(self, name: str) -> Array:
         """Return the height (n, n) of a part's underside in the latest step; infinite elsewhere."""
-        height = np.full(self.heights.size, np.inf)
-        np.minimum.at(height, *self._ceilings.get(name, (np.zeros(0, dtype=np.int64), np.zeros(0))))
-        return height.reshape(self.heights.shape)
+        return self._lowest([self._ceilings[name]] if name in self._ceilings else [])
 
     def _ceiling(self) -> Array:
-        ceiling = np.full(self.heights.size, np.inf)
-        for flat, z in self._ceilings.values():
-            np.minimum.at(ceiling, flat, z)
-        return ceiling.reshape(self.heights.shape)
+        return self._lowest(self._ceilings.values())
+
+    def _lowest(self, undersides: Iterable[Contact]) -> Array:
+        lowest = np.full(self.heights.size, np.inf)
+        for cells, z in undersides:
+            np.minimum.at(lowest, cells, z)
+        return lowest.reshape(self.heights.shape)
 
     def _raise_collar(self) -> None:
         """Spread the displaced volume around the contact, below whatever hangs over the bed."""
@@ -215,15 +285,19 @@ class Bed:
         touched = ceiling <= self.heights
         if not touched.any():
             return
-        distance = np.asarray(ndimage.distance_transform_edt(~touched)) * self.bag.cell
-        free = ~touched & (self._dome > self.bag.floor)
-        weight = np.where(free, np.exp(-distance / self.soil.collar_length), 0.0)
+        cell = self.bag.cell
+        sunk = np.maximum(self._settled - self.heights, 0.0)
+        drop = shoulder(touched, sunk, self.heights, cell, self.soil)
+        drop = np.minimum(drop, np.maximum(self.heights - self.bag.floor, 0.0))
+        self.heights = self.heights - drop
+        self.ledger.waiting += float(drop.sum()) * cell**2
+        weight = np.where(self._dome > self.bag.floor, rise_weight(touched, cell, self.soil), 0.0)
         for _ in range(4):
             if self.displaced <= 1e-15 or not weight.any():
                 return
-            rise = weight * (self.displaced / (weight.sum() * self.bag.cell**2))
+            rise = weight * (self.displaced / (weight.sum() * cell**2))
             raised = np.minimum(self.heights + rise, np.maximum(ceiling, self.heights))
-            self.displaced -= float((raised - self.heights).sum()) * self.bag.cell**2
+            self.ledger.waiting -= float((raised - self.heights).sum()) * cell**2
             self.heights = raised
             weight = np.where(raised < ceiling, weight, 0.0)
 
@@ -263,11 +337,13 @@ class Bed:
         ceiling = self._ceiling()
         held = ceiling <= self.heights
         conformed = np.where(held, np.maximum(ceiling, self.bag.floor), self.heights)
-        self.displaced += float((self.heights - conformed).sum()) * self.bag.cell**2
+        self._displace(self.heights.sum(), conformed)
         self.heights = conformed
         self._shrinkage = np.where(held, 0.0, contraction * self.heights)
         self.heights = self.heights - self._shrinkage
         self._traction[:] = 0.0
+        self._pressure[:] = 0.0
+        self._carried.clear()
 
     def conform(self, X_JP: tuple[Array, Array], samples: SurfaceSamples) -> None:
         """Lower the surface to a part that has pushed the frozen bed aside.
@@ -280,7 +356,7 @@ class Bed:
         heights = self.heights.reshape(-1)
         before = heights.sum()
         np.minimum.at(heights, cells, np.maximum(z, self.bag.floor))
-        self.displaced += float(before - heights.sum()) * self.bag.cell**2
+        self._displace(before, heights)
 
     def unjam(self) -> None:
         """Let air in again: the shrinkage goes back, the imprint stays."""
@@ -295,9 +371,14 @@ class Bed:
         return {
             "heights": self.heights.copy(),
             "traction": self._traction.copy(),
+            "pressure": self._pressure.copy(),
+            "carried": {name: carried.row() for name, carried in self._carried.items()},
             "shrinkage": self._shrinkage.copy(),
             "yield_pressure": self.yield_pressure.copy(),
             "reference": {name: R_JP.copy() for name, R_JP in self._reference.items()},
+            "shifts": {name: shift.copy() for name, shift in self._shifts.items()},
+            "settled": self._settled.copy(),
+            "ledger": self.ledger.array(),
             "scalars": np.array([getattr(self, name) for name in _SCALARS]),
         }
 
@@ -306,13 +387,13 @@ class Bed:
         self.inflate()
         self.heights = state["heights"].copy()
         self._traction = state["traction"].copy()
+        self._pressure = state["pressure"].copy()
+        self._carried = {k: Carried.from_row(row) for k, row in state.get("carried", {}).items()}
         self._shrinkage = state["shrinkage"].copy()
         self.yield_pressure = state["yield_pressure"].copy()
-        self._reference = {name: R_JP.copy() for name, R_JP in state["reference"].items()}
+        self._reference = {name: R_JP.copy() for name, R_JP in state.get("reference", {}).items()}
+        self._shifts = {name: shift.copy() for name, shift in state.get("shifts", {}).items()}
+        self._settled = state["settled"].copy()
+        self.ledger = Ledger(*map(float, state["ledger"]))
         for name, value in zip(_SCALARS, state["scalars"], strict=True):
             setattr(self, name, float(value))
-
-
-def _cross_matrix(w: Array) -> Array:
-    """Return [w] with [w] v = w x v."""
-    return np.array([[0.0, -w[2], w[1]], [w[2], 0.0, -w[0]], [-w[1], w[0], 0.0]])

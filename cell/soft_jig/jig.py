@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, Role, SceneGraph
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
@@ -204,7 +204,9 @@ class SoftJig:
         X_WJ = self.pose(context)
         for body, samples in self._pressing.values():
             X_JP, V_JP = self._motion_in_jig(context, X_WJ, body)
-            force, torque = self.bed.press(X_JP, V_JP, samples, dt)
+            M_P = body.CalcSpatialInertiaInBodyFrame(context)
+            inertia = M_P.ReExpress(RotationMatrix(X_JP[0])).CopyToFullMatrix6()
+            force, torque = self.bed.press(X_JP, V_JP, samples, dt, inertia)
             if force.any():
                 self._forces += self._pair(context, X_WJ, body, force, torque)
         self.bed.settle(dt)

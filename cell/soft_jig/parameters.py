@@ -24,12 +24,15 @@ class BagParameters:
         cap_height: Apex above the base plate [m]. [D] from 296 cm3 [S] and the radius.
         cell: Edge of a height-field cell [m]. [A] 1-3 mm; 1.5 resolves the motor's terminals.
         floor: Least thickness of beads over the base plate [m]. [A] three 1 mm beads.
+        bead_volume: Of all beads [m3]. [D] 450 g of glass at 2500 kg/m3 [S]: 61 % of the bare cap;
+            range 173e-6 to 184e-6.
     """
 
     cap_radius: float = 0.060
     cap_height: float = 0.0459
     cell: float = 0.0015
     floor: float = 0.003
+    bead_volume: float = 180e-6
 
     @property
     def aperture_radius(self) -> float:
@@ -52,16 +55,29 @@ class SoilParameters:
         gravity_pressure: Mean confinement by the beads' own weight [Pa]. [D] 250, range 200-420.
         membrane_modulus: Shear modulus times thickness [N/m]. [R] 0.15 MPa x 1 mm; 100-150.
         initial_stretch: Stretch of the membrane on the bare cap. [A] 1.02, range 1.00-1.05.
-        stiffness: Elastic Winkler modulus [Pa/m]. [A] 3e7: what an explicit step of 1 ms carries
-            under a free 68 g plate. It springs back 0.3 mm where DEM gives below 0.06 mm.
-        damping: Viscous part of the contact pressure [Pa s/m]. [A] numerical, below 2 % of the
-            yield pressure at 10 mm/s.
+        stiffness: Elastic Winkler modulus [Pa/m]. [A] 3e7, range 1e7-1.5e8; what a step of 1 ms
+            nearly carries under a free 68 g plate, and bounded where it does not
+            (`cell.soft_jig.stable`). It springs back 0.3 mm where DEM gives below 0.06 mm.
+        damping: Viscous part of the contact pressure and of the friction [Pa s/m]. [A] 1e4,
+            numerical, below 2 % of the yield pressure at 10 mm/s.
+        recovery_time: Of the damper beside the spring [s]: the bed gives back its elastic part in
+            this time and throws nothing off. [A] 50 ms, range 20-200; beads return little energy.
         viscosity: Overstress per plastic sinking speed [Pa s/m]. [A] 5e4, 0.5 kPa at 10 mm/s;
             DEM finds no rate effect at 10-80 mm/s, so keep it small.
         shear_stiffness: Tangential Winkler modulus of the membrane [Pa/m]. [A] 3e7; the 1 mm
             silicone sheet alone gives 1.5e8 [D], too stiff for an explicit step.
         surface_friction: Silicone on metal. [R] 0.6-1.3; 0.9.
-        collar_length: Decay length of the raised collar [m]. [A] 12 mm; DEM peak at 16 mm.
+        collar_place: Distance from the part's rim at which displaced beads rise most [m]. [R] 16 mm
+            in the DEM's rigid cup, 30 mm on the flanks of its free dome; range 16-30.
+        shoulder_share: How far the bed at a part's rim sinks with it, relative. [R] 0.85 in the
+            DEM dome, which has no membrane, next to 0 in its rigid cup. [A] 0: the bag's membrane
+            is clamped all around; range 0-0.85. It lowers the walls, see the element tests.
+        shoulder_length: Decay of the shoulder relative to the radius of the contact. [R] 0.33 (5.8
+            mm beside the 17.5 mm punch in the DEM dome).
+        dilation_limit: Volume that the beads gain by shear in the end [m3]. [R] DEM cup 7e-6, 2.4 %
+            of the bag; range 0-7e-6.
+        dilation_scale: Displaced volume over which they do [m3]. [R] 6.6e-6; with the limit it
+            gives raised over displaced volume 1.75 / 1.56 / 1.43 at 5 / 10 / 15 mm, as DEM.
         packing_slack: Volume the packing takes up before the collar rises [m3]. [A] 0; the fill
             allows 0-12e-6 [D], but DEM beds dilate rather than compact.
         settle_period: Time between two redistributions of displaced volume [s]. [A]
@@ -74,10 +90,15 @@ class SoilParameters:
     initial_stretch: float = 1.02
     stiffness: float = 3.0e7
     damping: float = 1.0e4
+    recovery_time: float = 0.050
     viscosity: float = 5.0e4
     shear_stiffness: float = 3.0e7
     surface_friction: float = 0.9
-    collar_length: float = 0.012
+    collar_place: float = 0.016
+    shoulder_share: float = 0.0
+    shoulder_length: float = 0.33
+    dilation_limit: float = 7.0e-6
+    dilation_scale: float = 6.6e-6
     packing_slack: float = 0.0
     settle_period: float = 0.010
 
@@ -115,12 +136,14 @@ class JammedParameters:
     """The frozen bed: a compliant hydroelastic body.
 
     Attributes:
-        pressure_gradient: Contact pressure per depth at 90 kPa [Pa/m]. [A] 2.5e8 (1-5 MPa over
-            4-20 mm); stiffness of a packing goes with the square root of its confinement [R].
+        pressure_gradient: Contact pressure per depth at 90 kPa [Pa/m]. [D] 4e8: a flat 35 mm punch
+            on a half-space of E50 = 10 MPa, 2 E / (pi a (1 - nu2)); range 2e8-1.3e9 (E50 5 MPa to
+            the DEM's 33 MPa). It goes with the square root of the confinement [R].
         soft_gradient: The same while not jammed, for hands that touch the bag [Pa/m]. [A] one
             tenth: stiffness of a packing goes with the square root of pressure [R].
-        squeeze: Offset g of the wall from the part's outline [m], negative squeezes. [R] DEM: the
-            dent closes 0.05 mm on evacuation; range 0 to -0.2 mm. It dominates holding.
+        squeeze: Offset g of the wall from the part's outline [m], negative squeezes. [R] DEM dome:
+            the dent closes by 0.05 mm in diameter on evacuation; [D] 0.4 % of volume is 0.13 % of
+            length, 0.023 mm of a 17.5 mm radius. Range 0 to -0.04 mm; in a rigid cup it opens.
         friction: Membrane on metal. [R] 0.6-1.3; 0.9.
         dissipation: Hunt-Crossley [s/m]. [A] 5; 0-50 changes holding by 15 %.
         layer: Depth of the pressure field's interior vertices [m]. [A] 5 mm.
@@ -133,9 +156,9 @@ class JammedParameters:
         return_period: Least time between two such moves [s]. [A] numerical.
     """
 
-    pressure_gradient: float = 2.5e8
-    soft_gradient: float = 2.5e7
-    squeeze: float = -0.05e-3
+    pressure_gradient: float = 4.0e8
+    soft_gradient: float = 4.0e7
+    squeeze: float = -0.025e-3
     friction: float = 0.9
     dissipation: float = 5.0
     layer: float = 0.005

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+# A face that looks down by less than this (cosine of 84 deg) is a wall: it shows the bed no area,
+# and one that comes and goes as the part rocks would keep it rocking.
+WALL = -0.1
 # Slope to which a bin's surface is limited when it is carried to the middle of a cell.
 STEEPEST = 2.0
 
@@ -72,7 +75,7 @@ class SurfaceSamples:
         A surface more than `bin_size` above the lowest one of its bin counts as hidden.
         """
         facing = self.normals @ R_JP[2]
-        down = facing < -0.02
+        down = facing < WALL
         p_J, normals_J = self.points[down] @ R_JP.T, self.normals[down] @ R_JP.T
         bins = np.rint(p_J[:, :2] / bin_size).astype(np.int64)
         order = np.lexsort((p_J[:, 2], bins[:, 1], bins[:, 0]))

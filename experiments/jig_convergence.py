@@ -1,0 +1,122 @@
+"""Convergence of what the frozen bed holds: `python -m experiments.jig_convergence [--out DIR]`.
+
+The holding force of a standing cylinder, a lying cylinder and the plate on its foot against the
+mesh of the frozen bed, the cell of the soft one, the time step and Drake's contact approximation,
+one at a time from the defaults. Vented, 90 kPa: elastic contact and yield alone. Prints a table and
+writes it as `convergence.csv`.
+
+The approximation in use is "lagged": it keeps Hunt-Crossley dissipation and its friction is
+Coulomb's with the normal force of the step before. "sap" replaces dissipation by a relaxation time
+of its own and lets regularised friction creep; "similar" lies between.
+"""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import tyro
+
+from cell import load_product
+from cell.soft_jig import JigParameters
+from experiments.element_rig import ElementRig
+from experiments.jig_element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
+from experiments.specimens import Prism, ProductPart, Specimen
+
+DEPTH = 0.010
+STEPS = (2e-3, 1e-3, 0.5e-3)
+APPROXIMATIONS = ("lagged", "similar", "sap")
+# Coarse to fine; the middle one is the default.
+SCALES = (2.0, 1.0, 0.5)
+
+
+@dataclass(frozen=True)
+class Setting:
+    """One variation: what is varied, to what, and the rig's numbers."""
+
+    varied: str
+    value: str
+    params: JigParameters
+    time_step: float = 1e-3
+    approximation: str = "lagged"
+
+
+def settings() -> Iterator[Setting]:
+    """Yield the variations; the defaults come first."""
+    params = parameters()
+    yield Setting("default", "", params)
+    for scale in SCALES:
+        if scale == 1.0:
+            continue
+        for name in ("edge", "ring", "layer"):
+            value = scale * getattr(params.jammed, name)
+            jammed = replace(params.jammed, **{name: value})
+            yield Setting(f"mesh {name}", f"{value * 1e3:g} mm", replace(params, jammed=jammed))
+        cell = params.bag.cell * (scale if scale < 1 else 4 / 3)
+        bag = replace(params.bag, cell=cell)
+        yield Setting("bed cell", f"{cell * 1e3:g} mm", replace(params, bag=bag))
+    for step in STEPS:
+        if step != 1e-3:
+            yield Setting("time step", f"{step * 1e3:g} ms", params, time_step=step)
+    for approximation in APPROXIMATIONS[1:]:
+        yield Setting("approximation", approximation, params, approximation=approximation)
+
+
+def specimens() -> dict[str, Specimen]:
+    """Return what is held."""
+    plate = load_product("motor_unit").parts["plate"]
+    return {
+        "standing": Prism(),
+        "lying": Prism(lying=True),
+        "plate P2": ProductPart(plate, (0, 1, 0)),
+    }
+
+
+def holding_force(specimen: Specimen, setting: Setting, depth: float = DEPTH) -> float:
+    """Return what a part holds against a push near its top, across its least stable side [N]."""
+    rig = ElementRig(
+        setting.params, specimen, time_step=setting.time_step, approximation=setting.approximation
+    )
+    rig.lower_to(depth, speed=0.04)
+    rig.jam()
+    rig.let_go(0.2)
+    top = rig.X_JP.inverse() @ np.array([0.0, 0.0, rig.params.bag.cap_height + lever(specimen)])
+    # A lying cylinder along x is pushed across, the plate out of its plane.
+    direction = SIDEWAYS if isinstance(specimen, Prism) and not specimen.lying else across(rig)
+    return rig.drag(top, direction, speed=0.02).holding_force
+
+
+def lever(specimen: Specimen) -> float:
+    """Return how far over the apex the push acts [m]: 40 mm where the part is that tall."""
+    height = np.ptp(specimen.mesh().vertices @ specimen.X_CP.rotation().matrix()[2])
+    return float(min(PUSH_HEIGHT, height - DEPTH - 0.005))
+
+
+def across(rig: ElementRig) -> np.ndarray:
+    """Return the horizontal axis of J in which the part is thinnest."""
+    corners = rig.part.mesh().vertices @ rig.X_JP.rotation().matrix().T
+    return np.eye(3)[int(np.argmin(np.ptp(corners, axis=0)[:2]))]
+
+
+def main(out: Path = Path("out/convergence")) -> None:
+    """Run the study, print the table and write it."""
+    out.mkdir(parents=True, exist_ok=True)
+    parts = specimens()
+    rows: list[list[str | float]] = []
+    for setting in settings():
+        forces = [holding_force(part, setting) for part in parts.values()]
+        rows.append([setting.varied, setting.value, *forces])
+        print(
+            f"{setting.varied:14s} {setting.value:8s}", *(f"{f:7.2f} N" for f in forces), flush=True
+        )
+    with (out / "convergence.csv").open("w", newline="", encoding="utf-8") as file:
+        writer = csv.writer(file)
+        writer.writerow(["varied", "value", *(f"{name} [N]" for name in parts)])
+        writer.writerows(rows)
+
+
+if __name__ == "__main__":
+    tyro.cli(main)

@@ -1,0 +1,67 @@
+"""Letting go of a part on the bed while it is soft: it comes to rest in its imprint."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from test_jam_postures import POSTURES, PRESS_FORCE
+
+from cell import load_product
+from cell.soft_jig import JigState
+from cell.soft_jig.stable import Carried, largest_stiffness, normal_rows
+from experiments.element_rig import ElementRig
+from experiments.specimens import ProductPart
+
+
+def released(posture: str, time_step: float):
+    """Return the rig a second after a sudden release, and the part's speed per step [m/s]."""
+    name, up = POSTURES[posture]
+    specimen = ProductPart(load_product("motor_unit").parts[name], up)
+    rig = ElementRig(part=specimen, press_force=PRESS_FORCE, time_step=time_step)
+    rig.lower_to(0.025, speed=0.08)
+    pressed, speeds = rig.depth, []
+    rig.let_go(0)
+    for _ in range(round(1.2 / time_step)):
+        rig.step()
+        speeds.append(rig.speed)
+    return rig, pressed, np.array(speeds)
+
+
+@pytest.mark.parametrize("posture", POSTURES)
+def test_part_comes_to_rest_on_the_soft_bed(posture: str) -> None:
+    """Let go at once after a press by 20 N; below 2 mm/s, carried, and most of the depth kept."""
+    rig, pressed, speeds = released(posture, 1e-3)
+    assert rig.jig.state is JigState.SOFT
+    assert speeds[-100:].max() < 2e-3
+    assert rig.depth > 0.75 * pressed
+    weight = rig.body.default_mass() * 9.81
+    assert rig.bed_force == pytest.approx(weight, rel=0.1)
+
+
+def test_half_the_step_comes_to_rest_as_well() -> None:
+    rig, pressed, speeds = released("plate P2", 5e-4)
+    assert speeds[-100:].max() < 2e-3
+    assert rig.depth > 0.75 * pressed
+
+
+def test_stiffness_is_bounded_by_step_and_inertia() -> None:
+    """A flat square on a point mass: k A dt2 / m below one; half the step allows four times it."""
+    side = np.linspace(-0.01, 0.01, 5)
+    x, y = (grid.ravel() for grid in np.meshgrid(side, side))
+    arms, areas = np.column_stack([x, y, np.zeros(25)]), np.full(25, 1e-5)
+    inertia = np.diag([1.0, 1.0, 1.0, 0.1, 0.1, 0.1])  # Too much to turn.
+    bound = largest_stiffness(inertia, arms, areas, 1e-3)
+    assert 0.5 < bound * areas.sum() * 1e-6 / 0.1 < 1.0
+    assert largest_stiffness(inertia, arms, areas, 5e-4) == pytest.approx(4 * bound)
+
+
+def test_predicted_velocity_is_backward_euler() -> None:
+    """A free mass that the bed pushes up: m dv = dt (F - weight - c v)."""
+    inertia, rows = np.diag([1e-3] * 3 + [0.1] * 3), normal_rows(np.zeros((1, 3)))
+    V, F = np.zeros(6), np.array([0, 0, 0, 0, 0, 1.0])
+    weight = 0.1 * 9.81
+    after = np.array([0, 0, 0, 0, 0, (1.0 - weight) / 0.1 * 1e-3])
+    carried = Carried(V, F, True)
+    ahead = carried.ahead(inertia, rows, np.array([2.0]), np.array([30.0]), after, 1e-3)
+    expected = (0.1 * after[5] + 1e-3 * (2.0 - weight)) / (0.1 + 1e-3 * 30.0)
+    assert ahead[5] == pytest.approx(expected)
