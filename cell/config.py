@@ -122,13 +122,15 @@ class PushConfig:
         1.5, "kg", "Base and beads; not in the paper, range 1 to 3 [A].", above=0.45
     )
     base_friction: float = setting(
-        0.3, "", "Of the base on the force plate, range 0.3 to 0.6 [A].", above=0.0, at_most=2.0
+        0.4, "", "Of the base on the force plate, range 0.3 to 0.6 [A].", above=0.0, at_most=2.0
     )
     speed: float = setting(
-        0.25, "m/s", "At the end of the push: coasting by 8 mm past 70 [S] asks for 0.22 to 0.28"
+        0.28, "m/s", "At the end of the push: coasting by 8 mm past 70 [S] asks for 0.22 to 0.29"
         " [D].", above=0.0, at_most=1.0,
     )  # fmt: skip
-    acceleration: float = setting(2.5, "m/s2", "Of the hand from rest [A].", above=0.0)
+    acceleration: float = setting(
+        1.0, "m/s2", "Of the hand from rest: up to speed in 39 mm of the 70 [A].", above=0.0
+    )
     stroke: float = setting(0.070, "m", "Of the straight push [S].", above=0.0, at_most=0.15)
     start_gap: float = setting(
         2e-3, "m", "Between hand and part at the start [A].", at_least=0.0, at_most=0.02
