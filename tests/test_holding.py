@@ -129,7 +129,7 @@ def test_imprint_bears_the_press_force_and_keeps_the_beads():
     geometry = geometry_of(product)
     imprint = press([samples_of(geometry.solids["can"])], posture("+z"), np.zeros(2), JIG, 20.0)
     assert 20.0 <= imprint.force < 23.0
-    assert 8e-3 < imprint.depth < 12e-3  # [M] In the twin the arm stops at 8 mm, on the first 20 N.
+    assert 8e-3 < imprint.depth < 14e-3  # [M] In the twin the arm stops at 9.5 mm.
     assert imprint.homeless < 0.01 * imprint.volume
     assert imprint.contact is not None
     assert imprint.contact.circle[1] == pytest.approx(34.8e-3, abs=2 * imprint.cell)
