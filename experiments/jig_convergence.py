@@ -5,9 +5,10 @@ mesh of the frozen bed, the cell of the soft one, the time step and Drake's cont
 one at a time from the defaults. Vented, 90 kPa: elastic contact and yield alone. Prints a table and
 writes it as `convergence.csv`.
 
-The approximation in use is "lagged": it keeps Hunt-Crossley dissipation and its friction is
-Coulomb's with the normal force of the step before. "sap" replaces dissipation by a relaxation time
-of its own and lets regularised friction creep; "similar" lies between.
+The approximation in use is "lagged", by argument and not by measurement: it keeps Hunt-Crossley
+dissipation, and its friction is Coulomb's with the normal force of the step before. "sap" replaces
+dissipation by a relaxation time of its own and lets regularised friction creep; "similar" lies
+between.
 """
 
 from __future__ import annotations

@@ -257,7 +257,8 @@ REASONS = """Differences beyond 30 %:
 - Vented pushes: forces of 1 to 4 N, which scatter up to six times between the reference's packings.
   Ours grow with the imprint's wall (passive wedge). In the reference's dome the ground beside the
   cylinder sinks with it and leaves 4 to 7 mm of wall at 10 to 15 mm of depth, for which the formula
-  gives 1.3 and 2.7 N; `jig.soil.shoulder_share` 0.85 lets it sink here.
+  gives 1.3 and 2.7 N; `jig.soil.shoulder_share` 0.85 lets it sink here; pushes with
+  it have not been measured.
 - Vented pull: the reference's 2 N (the weight) is of its rigid cup, whose dent opens on evacuation;
   in a dome it closes by 0.05 mm in diameter, as here, and friction on that is the difference.
 - Sealed pushes: the reference fails at 2 to 3 mm, ours still rises at 6: the frozen bed is softer

@@ -70,8 +70,9 @@ class SoilParameters:
         collar_place: Distance from the part's rim at which displaced beads rise most [m]. [R] 16 mm
             in the DEM's rigid cup, 30 mm on the flanks of its free dome; range 16-30.
         shoulder_share: How far the bed at a part's rim sinks with it, relative. [R] 0.85 in the
-            DEM dome, which has no membrane, next to 0 in its rigid cup. [A] 0: the bag's membrane
-            is clamped all around; range 0-0.85. It lowers the walls, see the element tests.
+            DEM dome, which has no membrane, next to 0 in its rigid cup; range 0-0.85. [A] 0,
+            for a practical reason and not by evidence: with 0.85 a press of 20 N finds no end, and
+            leaning plates cannot be meshed. It would lower the walls.
         shoulder_length: Decay of the shoulder relative to the radius of the contact. [R] 0.33 (5.8
             mm beside the 17.5 mm punch in the DEM dome).
         dilation_limit: Volume that the beads gain by shear in the end [m3]. [R] DEM cup 7e-6, 2.4 %
