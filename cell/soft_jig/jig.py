@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, Role, SceneGraph
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
@@ -31,10 +32,12 @@ from cell.soft_jig.drake_values import (
     drake_shape,
     force_row,
     hull_vertices,
+    inertia_in_jig,
     lean_of,
 )
 from cell.soft_jig.holding import Holding
 from cell.soft_jig.parameters import FULL_VACUUM, JigParameters
+from cell.soft_jig.pins import Pins
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.suction import Seal, SealedPatch
 from cell.soft_jig.visual import membrane_shape
@@ -195,7 +198,7 @@ class SoftJig:
             return
         self._press(root_context, dt)
         if self._pumping and self.pressure >= vacuum.jam_fraction * vacuum.pressure:
-            self._jam(root_context)
+            self._jam(root_context, dt)
         else:
             self._draw_if_due(root_context, dt)
 
@@ -204,8 +207,7 @@ class SoftJig:
         X_WJ = self.pose(context)
         for body, samples in self._pressing.values():
             X_JP, V_JP = self._motion_in_jig(context, X_WJ, body)
-            M_P = body.CalcSpatialInertiaInBodyFrame(context)
-            inertia = M_P.ReExpress(RotationMatrix(X_JP[0])).CopyToFullMatrix6()
+            inertia = inertia_in_jig(context, body, X_JP)
             force, torque = self.bed.press(X_JP, V_JP, samples, dt, inertia)
             if force.any():
                 self._forces += self._pair(context, X_WJ, body, force, torque)
@@ -243,13 +245,15 @@ class SoftJig:
         ]
 
     def _hold(self, root_context: Context, dt: float) -> None:
-        """Add to the elastic contact what suction pulls and what the beads cannot carry."""
+        """Add to the elastic contact suction, pins, and what the beads cannot carry."""
         context = self._plant.GetMyContextFromRoot(root_context)
         X_WJ, holding = self.pose(context), self._holding
         bodies = {name: body for name, (body, _) in self._pressing.items()}
-        for load in holding.pulls(context, X_WJ, bodies, self.pressure):
-            self._forces += self._pair(context, X_WJ, *load)
-        for load in holding.reliefs(context, X_WJ, self.bed.confinement):
+        for load in chain(
+            holding.pulls(context, X_WJ, bodies, self.pressure),
+            holding.pushes(context, X_WJ, bodies, self.bed.confinement),
+            holding.reliefs(context, X_WJ, self.bed.confinement),
+        ):
             self._forces += self._pair(context, X_WJ, *load)
         mesh = holding.return_mesh(self._mesh, dt)
         if mesh is not None:
@@ -258,30 +262,35 @@ class SoftJig:
 
     # Freezing and drawing.
 
-    def _jam(self, root_context: Context) -> None:
+    def _jam(self, root_context: Context, dt: float) -> None:
         context = self._plant.GetMyContextFromRoot(root_context)
-        X_WJ = self.pose(context)
-        for name in self._pressing:
-            self._holding.seals[name] = self._seal(context, X_WJ, name)
+        X_WJ, holding = self.pose(context), self._holding
+        for name, (body, samples) in self._pressing.items():
+            X_JP, _ = self._motion_in_jig(context, X_WJ, body)
+            lip = self.params.suction.lip
+            holding.seals[name] = Seal.under(self.bed, samples.name, X_JP, lip)
         self.bed.jam(self.params.vacuum.contraction)
         self.state = JigState.JAMMED
+        self._forces = []
+        self._mesh = self._mesh_with_imprint(context, X_WJ)
+        self._install(root_context)
+        for name, (body, samples) in self._pressing.items():
+            X_JP, _ = self._motion_in_jig(context, X_WJ, body)
+            inertia = inertia_in_jig(context, body, X_JP)
+            modulus = self._gradient()
+            holding.pins[name] = Pins.inside(self._mesh, samples, X_JP, modulus, inertia, dt)
+
+    def _mesh_with_imprint(self, context: Context, X_WJ: RigidTransform) -> TetMesh:
         hulls, lean = [], np.zeros(2)
         for body, _ in self._pressing.values():
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
             hulls += self._bed_hulls(body, X_JP)
             lean = lean_of(X_JP.rotation())
-        self._forces = []
-        self._mesh = imprint_mesh(self.bed, self.params.jammed, hulls, lean)
-        self._install(root_context)
-
-    def _seal(self, context: Context, X_WJ: RigidTransform, name: str) -> Seal:
-        body, samples = self._pressing[name]
-        X_JP, _ = self._motion_in_jig(context, X_WJ, body)
-        return Seal.under(self.bed, samples.name, X_JP, self.params.suction.lip)
+        return imprint_mesh(self.bed, self.params.jammed, hulls, lean)
 
     def _show_bed(self, root_context: Context) -> None:
         self._forces = []
-        self._holding.seals.clear()
+        self._holding.let_go()
         self._mesh = bed_mesh(self.bed, self.params.jammed)
         self._install(root_context)
 
