@@ -39,7 +39,7 @@ from cell.soft_jig.holding import Holding
 from cell.soft_jig.parameters import FULL_VACUUM, JigParameters
 from cell.soft_jig.pins import Pins
 from cell.soft_jig.samples import SurfaceSamples
-from cell.soft_jig.suction import Seal, SealedPatch
+from cell.soft_jig.suction import Seal
 from cell.soft_jig.visual import membrane_shape
 
 Array = NDArray[np.float64]
@@ -67,6 +67,7 @@ class SoftJig:
         bed: The surface and its constitutive model.
         state: Where the jig is in INFLATED -> SOFT -> JAMMED -> SOFT.
         pressure: Confining pressure in the bag [Pa].
+        holding: What holds each body while jammed: seals, pins, yield.
         filters_lifted: Given the root context, lifts every passing collision filter for the time
             of a swap, which Drake demands; whoever sets such filters provides it.
     """
@@ -94,7 +95,7 @@ class SoftJig:
         self._pressing: dict[str, tuple[RigidBody, SurfaceSamples]] = {}
         self._forces: list[ExternallyAppliedSpatialForce] = []
         self._since_drawn = 0.0
-        self._holding = Holding(plant, scene_graph, self._bed_id, params)
+        self.holding = Holding(plant, scene_graph, self._bed_id, params)
 
     @staticmethod
     def add(
@@ -169,11 +170,6 @@ class SoftJig:
         """The bodies that the soft bed carries."""
         return tuple(body for body, _ in self._pressing.values())
 
-    @property
-    def sealed_patches(self) -> dict[str, list[SealedPatch]]:
-        """The flat contacts of each held body with their sealed fraction; empty unless jammed."""
-        return {name: list(seal.patches) for name, seal in self._holding.seals.items()}
-
     # Simulation.
 
     @property
@@ -247,7 +243,7 @@ class SoftJig:
     def _hold(self, root_context: Context, dt: float) -> None:
         """Add to the elastic contact suction, pins, and what the beads cannot carry."""
         context = self._plant.GetMyContextFromRoot(root_context)
-        X_WJ, holding = self.pose(context), self._holding
+        X_WJ, holding = self.pose(context), self.holding
         bodies = {name: body for name, (body, _) in self._pressing.items()}
         for load in chain(
             holding.pulls(context, X_WJ, bodies, self.pressure),
@@ -264,7 +260,7 @@ class SoftJig:
 
     def _jam(self, root_context: Context, dt: float) -> None:
         context = self._plant.GetMyContextFromRoot(root_context)
-        X_WJ, holding = self.pose(context), self._holding
+        X_WJ, holding = self.pose(context), self.holding
         for name, (body, samples) in self._pressing.items():
             X_JP, _ = self._motion_in_jig(context, X_WJ, body)
             lip = self.params.suction.lip
@@ -290,7 +286,7 @@ class SoftJig:
 
     def _show_bed(self, root_context: Context) -> None:
         self._forces = []
-        self._holding.let_go()
+        self.holding.let_go()
         self._mesh = bed_mesh(self.bed, self.params.jammed)
         self._install(root_context)
 
@@ -298,7 +294,7 @@ class SoftJig:
         """Replace contact and visible geometry in the Context by the present mesh and surface."""
         context = self._scene_graph.GetMyMutableContextFromRoot(root_context)
         graph, source = self._scene_graph, self._plant.get_source_id()
-        self._holding.forget()
+        self.holding.forget()
         properties = drake_proximity(self._mesh, self.params, self._gradient())
         with self.filters_lifted(root_context):
             # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
@@ -375,7 +371,7 @@ class SoftJig:
             "pressure": self.pressure,
             "pumping": self._pumping,
             "since_drawn": self._since_drawn,
-            "holding": self._holding.state(),
+            "holding": self.holding.state(),
             "vertices": self._mesh.vertices.copy(),
             "tetrahedra": self._mesh.tetrahedra.copy(),
             "forces": np.array([force_row(force) for force in self._forces]).reshape(-1, 10),
@@ -390,7 +386,7 @@ class SoftJig:
         self._mesh = TetMesh(state["vertices"].copy(), state["tetrahedra"].copy())
         self._install(root_context)
         self._since_drawn = float(state["since_drawn"])
-        self._holding.restore(state["holding"])
+        self.holding.restore(state["holding"])
         self._forces = [self._from_row(row) for row in state["forces"]]
 
     def _from_row(self, row: Array) -> ExternallyAppliedSpatialForce:
