@@ -1,1 +1,12 @@
-"""Run, measure, report: the command line and one readable script per experiment."""
+"""Run, measure, report. Each file in this folder is a script: ``python -m experiments.NAME``.
+
+The folders are the rooms that the scripts share, from the lowest up:
+
+- `reporting`: files, pages, plots, pictures.
+- `metrics`: what an assembly is judged by.
+- `jig`: element tests of the soft jig alone.
+- `plan`, `assembly`, `paper`: ``soft-jig plan``, ``assemble``, and ``place``, ``push``, ``regress``.
+- `cli`: the command line.
+
+A test keeps their imports pointing down.
+"""

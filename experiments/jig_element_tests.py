@@ -28,8 +28,8 @@ from cell.soft_jig.bed import Bed
 from cell.soft_jig.parameters import FULL_VACUUM
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.yielding import Strength
-from experiments.element_rig import Drag, ElementRig
-from experiments.specimens import Prism
+from experiments.jig.element_rig import Drag, ElementRig
+from experiments.jig.specimens import Prism
 
 Array = NDArray[np.float64]
 
@@ -55,7 +55,7 @@ class Row:
 
 def reference() -> dict[str, Any]:
     """Return the discrete-element figures."""
-    text = files("experiments").joinpath("element_reference.yaml").read_text(encoding="utf-8")
+    text = files("experiments.jig").joinpath("element_reference.yaml").read_text(encoding="utf-8")
     return yaml.safe_load(text)
 
 
