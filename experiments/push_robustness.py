@@ -31,7 +31,7 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 from cell.config import CellConfig
 from cell.errors import CellError
 from cell.loading import load_product
-from experiments.cli.main import BadUsage, Common
+from experiments.cli.common import BadUsage, Common
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases
 from experiments.paper.place_push import cases_of

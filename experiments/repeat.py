@@ -23,7 +23,8 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.errors import CellError
 from cell.loading import load_product
-from experiments.cli.main import Assemble, BadUsage
+from experiments.cli.assemble import Assemble
+from experiments.cli.common import BadUsage
 from experiments.metrics.criteria import LIMITS, Limit
 from experiments.reporting.output import output_folder, write_json
 

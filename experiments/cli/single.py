@@ -16,7 +16,8 @@ from cell.errors import CellError
 from cell.loading import load_product
 from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
-from experiments.cli.main import Assemble, split_order
+from experiments.cli.assemble import Assemble
+from experiments.cli.common import split_order
 from experiments.reporting.output import output_folder
 
 
