@@ -5,7 +5,8 @@ The folders are the rooms that the scripts share, from the lowest up:
 - `reporting`: files, pages, plots, pictures.
 - `metrics`: what an assembly is judged by.
 - `jig`: element tests of the soft jig alone.
-- `plan`, `assembly`, `paper`: ``soft-jig plan``, ``assemble``, and ``place``, ``push``, ``regress``.
+- `plan`, `assembly`: ``soft-jig plan`` and ``soft-jig assemble``.
+- `paper`: its experiments, ``soft-jig place``, ``push`` and ``regress``.
 - `cli`: the command line.
 
 A test keeps their imports pointing down.

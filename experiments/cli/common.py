@@ -1,4 +1,4 @@
-"""What every command takes, and how a wrong command line is told from a right one."""
+"""What the commands share: options, the refusal of a wrong one, how an order is written."""
 
 from __future__ import annotations
 

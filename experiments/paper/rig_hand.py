@@ -82,16 +82,6 @@ class RigHand:
         """Looks at part and jig, and records."""
         return self.simulation.observer
 
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self.simulation.time
-
-    @property
-    def stepping_cpu(self) -> float:
-        """CPU seconds spent stepping so far."""
-        return self.simulation.stepping_cpu
-
     def press(self) -> None:
         """Grip, press, freeze: as the robot does it."""
         self._grip()

@@ -127,16 +127,6 @@ class RobotHand:
         self._placing = _Pending(pick_place(station, self._name, bench.posture.up, suits=suits))
         self.planned = self._planned(0.0)
 
-    @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        return self.simulation.time
-
-    @property
-    def stepping_cpu(self) -> float:
-        """CPU seconds spent stepping so far."""
-        return self.simulation.stepping_cpu
-
     def press(self) -> None:
         """Fetch the part, press it into the bag and freeze it there."""
         self.wait("pick: ready", READY_TIME)
@@ -182,7 +172,7 @@ class RobotHand:
 
     def _run(self, phase: Phase) -> Outcome:
         """Run one phase, recorded; what the bag cannot hold is a verdict on the trial."""
-        self.observer.begin(phase.name, self.time)
+        self.observer.begin(phase.name, self.simulation.time)
         try:
             return self.simulation.run_phase(replace(phase, every_step=self._record))
         except CellError as error:

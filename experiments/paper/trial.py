@@ -56,6 +56,20 @@ class Disturbance:
         return RigidTransform(X_WJ.rotation(), p_WJ)
 
 
+class Clock(Protocol):
+    """What a trial reads of a simulation, the rig's or the cell's."""
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        ...
+
+    @property
+    def stepping_cpu(self) -> float:
+        """CPU seconds spent stepping so far."""
+        ...
+
+
 class Hand(Protocol):
     """A hand at work in one trial; its methods are called in this order.
 
@@ -73,13 +87,8 @@ class Hand(Protocol):
         ...
 
     @property
-    def time(self) -> float:
-        """Simulated time [s]."""
-        ...
-
-    @property
-    def stepping_cpu(self) -> float:
-        """CPU seconds spent stepping so far."""
+    def simulation(self) -> Clock:
+        """What the hand works in."""
         ...
 
     def press(self) -> None:
@@ -192,7 +201,8 @@ def run_trial(hand: Hand, push: Push | None, watch: Watch = ignore) -> Trial:
     watch("end", seen)
     trial.moved, trial.last_jig = seen.X_JP, seen.X_WJ
     trial.log = seen.log.arrays()
-    trial.sim_seconds, trial.cpu_seconds = hand.time, hand.stepping_cpu
+    clock = hand.simulation
+    trial.sim_seconds, trial.cpu_seconds = clock.time, clock.stepping_cpu
     return trial
 
 
