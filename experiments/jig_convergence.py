@@ -23,9 +23,9 @@ import tyro
 
 from cell import load_product
 from cell.soft_jig import JigParameters
-from experiments.element_rig import ElementRig
-from experiments.jig_element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
-from experiments.specimens import Prism, ProductPart, Specimen
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
+from experiments.jig.specimens import Prism, ProductPart, Specimen
 
 DEPTH = 0.010
 STEPS = (2e-3, 1e-3, 0.5e-3)

@@ -31,12 +31,12 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 from cell.config import CellConfig
 from cell.errors import CellError
 from cell.loading import load_product
-from experiments.case_plots import PAPER_MEANS
-from experiments.cases import run_cases
-from experiments.cli import BadUsage, Common
-from experiments.output import output_folder, write_json
-from experiments.place_push import cases_of
-from experiments.results import versions
+from experiments.cli.common import BadUsage, Common
+from experiments.paper.case_plots import PAPER_MEANS
+from experiments.paper.cases import run_cases
+from experiments.paper.place_push import cases_of
+from experiments.reporting.output import output_folder, write_json
+from experiments.reporting.provenance import versions
 
 # Path in the configuration -> its range in the sources, for the table; the cloud is ±10 %.
 PARAMETERS = {

@@ -8,8 +8,8 @@ from scipy.spatial import KDTree
 
 from cell import load_product
 from cell.soft_jig import JigState, SurfaceSamples
-from experiments.element_rig import ElementRig
-from experiments.specimens import ProductPart
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.specimens import ProductPart
 
 # Axis of the part frame that points up, by part and posture.
 POSTURES = {

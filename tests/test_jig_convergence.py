@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
+from experiments.jig.specimens import Prism
 from experiments.jig_convergence import holding_force, lever, settings, specimens
-from experiments.specimens import Prism
 
 
 def test_every_setting_varies_one_thing() -> None:
