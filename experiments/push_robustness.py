@@ -59,7 +59,7 @@ AS_CONFIGURED = "as configured"
 GRAVITY = 9.81  # [m/s2]
 NUMERICS = {
     "half the time step": {"simulation.time_step": 5e-4},
-    "finer bed mesh": {"jig.bag.cell": 0.001, "jig.jammed.edge": 0.008},
+    "finer bed mesh": {"jig.bag.cell": 0.001, "jig.jammed.mesh_size": 0.0035},
     "approximation similar": {"simulation.contact_approximation": "similar"},
     "approximation sap": {"simulation.contact_approximation": "sap"},
 }

@@ -96,4 +96,4 @@ def test_saved_pins_continue_alike() -> None:
     again = Pins.from_arrays(pushed.arrays())
     pushed.push(at(0.9e-3), STRENGTH)
     forces = [pins.push(at(0.9e-3), STRENGTH)[0] for pins in (pushed, again)]
-    assert np.array_equal(*forces)
+    assert np.array_equal(forces[0], forces[1])
