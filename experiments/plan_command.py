@@ -15,7 +15,7 @@ from experiments.plan_options import PlanOptions
 from experiments.plan_page.page import write_page
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.evidence import evidence_text
-from planning.fixing.explain import explanation, step_table, step_text, stop_text
+from planning.fixing.explain import explanation, step_table, step_texts, stop_text
 from planning.fixing.plan_file import save_plan
 from planning.fixing.planner import FixingPlan, plan
 from planning.fixing.remark import bolt_remarks
@@ -103,8 +103,8 @@ def _console() -> Console:
 
 def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
     console.print(step_table(fixing))
-    lines = [explanation(fixing)] if explain else [step_text(step) for step in fixing.steps]
-    lines += [stop_text(fixing.stop)] if fixing.stop else []
+    lines = [explanation(fixing)] if explain else step_texts(fixing)
+    lines += [stop_text(fixing)] if fixing.stop else []
     lines += [advice_text(fixing.orders)] if fixing.orders else []
     lines += [evidence_text(fixing.evidence)] if fixing.evidence else []
     _print_lines(console, lines)

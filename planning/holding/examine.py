@@ -125,12 +125,9 @@ class Examiner:
         bodies = self.gravity.components(trial.moved) + ([] if trial.held else [trial.body])
         widths = []
         for parts in bodies:
-            width, possible = self.gripper.width(parts, R_JA)
-            if not possible:
-                raise Rejected(
-                    f"no way to grip {_listed(parts)} in this posture: {1e3 * width:.0f} mm "
-                    f"across; the gripper opens {1e3 * STROKE:.0f} mm and cannot come from below"
-                )
+            width, obstacle = self.gripper.width(parts, R_JA)
+            if obstacle:
+                raise Rejected(f"no way to grip {_listed(parts)} in this posture: {obstacle}")
             widths.append(width)
         figures["grip_width_m"] = max(widths)
         return max(widths)

@@ -47,14 +47,22 @@ class Items:
 
     def connected(self, items: int) -> bool:
         """Say whether a set hangs together through contacts."""
-        reached = grown = items & -items
-        while grown:
+        return self._linked(items, items)
+
+    def connected_without(self, item: int, rest: int) -> bool:
+        """Say whether the rest of a set that hangs together does so without an item."""
+        return self._linked(self.touching[item] & rest, rest)
+
+    def _linked(self, some: int, items: int) -> bool:
+        """Say whether contacts within a set link some of its items with each other."""
+        reached = grown = some & -some
+        while grown and some & ~reached:
             near = 0
             for item in members(grown):
                 near |= self.touching[item]
             grown = near & items & ~reached
             reached |= grown
-        return reached == items
+        return not some & ~reached
 
     def listed(self, items: int) -> tuple[str, ...]:
         """Return the names in a set."""

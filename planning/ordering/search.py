@@ -61,12 +61,11 @@ def best_orders(items: Items, cost: StepCost, keep: int = 1) -> Found:
     layer: dict[int, list[Partial]] = {items.everything: [((), ())]}
     exact, sets, width = True, 1, layer_width(items)
     for _ in items.names[1:]:
-        layer = _taken_apart(items, layer, cost, keep)
-        sets += len(layer)
-        if len(layer) > width:
-            exact = False
-            cheapest = sorted(layer, key=lambda key: (layer[key][0][0], key))[:width]
-            layer = {key: layer[key] for key in cheapest}
+        ways_to = _taken_apart(items, layer, cost)
+        sets += len(ways_to)
+        exact = exact and len(ways_to) <= width
+        cheapest = sorted(ways_to, key=lambda rest: (min(w[0] for w in ways_to[rest]), rest))
+        layer = {rest: _distinct(items, ways_to[rest], keep) for rest in cheapest[:width]}
     finished = [
         (_sum(cost(0, item), spent), (item, *order))
         for rest, ways in layer.items()
@@ -81,20 +80,22 @@ def best_orders(items: Items, cost: StepCost, keep: int = 1) -> Found:
 
 
 def _taken_apart(
-    items: Items, layer: dict[int, list[Partial]], cost: StepCost, keep: int
+    items: Items, layer: dict[int, list[Partial]], cost: StepCost
 ) -> dict[int, list[Partial]]:
-    """Return the sets that are left when one item is taken off, with the cheapest ways to them."""
+    """Return the sets that are left when one item is taken off, with the ways to them."""
     found: dict[int, list[Partial]] = {}
     for whole, ways in layer.items():
         for item in members(whole):
             rest = whole ^ (1 << item)
-            if not items.leaves(item, rest) or not (rest in found or items.connected(rest)):
+            if not items.leaves(item, rest):
+                continue
+            if not (rest in found or items.connected_without(item, rest)):
                 continue
             spent = cost(rest, item)
             found.setdefault(rest, []).extend(
                 (_sum(spent, before), (item, *order)) for before, order in ways
             )
-    return {rest: _distinct(items, ways, keep) for rest, ways in found.items()}
+    return found
 
 
 def _distinct(items: Items, ways: list[Partial], keep: int) -> list[Partial]:
@@ -128,7 +129,9 @@ def any_order(items: Items) -> tuple[int, ...] | None:
         rest = whole ^ (1 << item)
         if rest == 0 and items.whole[item]:
             return (item, *reversed(taken))
-        if rest in tried or not rest or not items.leaves(item, rest) or not items.connected(rest):
+        if rest in tried or not rest or not items.leaves(item, rest):
+            continue
+        if not items.connected_without(item, rest):
             continue
         tried.add(rest)
         if len(tried) > MOST_SETS:
