@@ -57,18 +57,20 @@ def run_plan(
     described = load_product(
         product, options.units, densities=options.densities, group=options.group
     )
-    fixing = plan(
-        described,
-        order,
-        tolerance=options.tolerance,
-        cache=options.cache,
-        slanted=options.slanted,
-    )
-    assert fixing.geometry is not None
     console = _console()
+    with console.status("Matrices, steps and orders ..."):
+        fixing = plan(
+            described,
+            order,
+            tolerance=options.tolerance,
+            cache=options.cache,
+            slanted=options.slanted,
+        )
+    assert fixing.geometry is not None
     _print_plan(console, fixing, explain)
     setup, started = Setup.of(config or CellConfig()), time.perf_counter()
-    choices = general_rule(described, fixing, setup)
+    with console.status("Ways to hold it, by the general rule ..."):
+        choices = general_rule(described, fixing, setup)
     seconds = {"general rule": time.perf_counter() - started}
     remarks = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
     out.mkdir(parents=True, exist_ok=True)
@@ -77,7 +79,8 @@ def run_plan(
     save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
     save_matrices(fixing, out / "matrices.npz")
     if html:
-        seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
+        with console.status(f"Pictures for {page.name} ..."):
+            seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
     _print_rule(console, choices, explain, remarks)
     _print_times(console, fixing, seconds)
     return 0 if fixing.feasible else 1
