@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +11,7 @@ from rich.console import Console
 
 from cell.config import CellConfig
 from cell.loading import load_product
+from cell.product import Product
 from experiments.output import write_arrays
 from experiments.plan_options import PlanOptions
 from experiments.plan_page.page import write_page
@@ -54,9 +56,7 @@ def run_plan(
     Raises:
         CellError: The product or the order cannot be used; nothing is written.
     """
-    described = load_product(
-        product, options.units, densities=options.densities, group=options.group
-    )
+    described = _described(product, options)
     console = _console()
     with console.status("Matrices, steps and orders ..."):
         fixing = plan(
@@ -84,6 +84,13 @@ def run_plan(
     _print_rule(console, choices, explain, remarks)
     _print_times(console, fixing, seconds)
     return 0 if fixing.feasible else 1
+
+
+def _described(product: str, options: PlanOptions) -> Product:
+    described = load_product(
+        product, options.units, densities=options.densities, group=options.group
+    )
+    return replace(described, up=options.up) if options.up else described
 
 
 def save_matrices(fixing: FixingPlan, file: Path) -> None:

@@ -127,7 +127,8 @@ def _doubts(matrices: Matrices) -> list[str]:
         return [f"'{names[0]}' is the only part: there is nothing to assemble"]
     touching = matrices.contact + matrices.contact.T
     alone = [name for name, row in zip(names, touching, strict=True) if not row.any()]
-    return [f"{', '.join(alone)} touches no other part"] if alone else []
+    touch = "touches" if len(alone) == 1 else "touch"
+    return [f"{', '.join(alone)} {touch} no other part"] if alone else []
 
 
 def _fragile_contacts(matrices: Matrices, places: Places) -> list[Fragile]:
