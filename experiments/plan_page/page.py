@@ -166,7 +166,7 @@ def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]
         "": number,
         "on the jig": candidate.name + _by_paper(choice, candidate),
         "up": candidate.up,
-        "from": candidate.approach,
+        "from": candidate.approach.removeprefix("the "),
         "score": f"{candidate.score:.2f}",
         **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
         "bears / pushed across [N]": (
