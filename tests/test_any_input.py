@@ -202,6 +202,7 @@ def test_up_is_an_option_where_no_file_states_it(tmp_path: Path, up, fixed, caps
         ({"low": LOW, "high": HIGH}, ["--units", "feet"], 2, "No unit 'feet'"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm"], 0, "Tolerance 0.05 mm, by default"),
         ({"low": LOW}, ["--units", "mm"], 0, "'low' is the only part: there is nothing"),
+        ({"low": LOW, "high": HIGH}, ["--units", "mm", "--group"], 0, "'highs' is the only item"),
         (
             {"low": LOW, "high": HIGH.translate([0, 0, 3])},
             ["--units", "mm", "--order", "low,high"],
