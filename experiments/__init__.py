@@ -1,1 +1,13 @@
-"""Run, measure, report: the command line and one readable script per experiment."""
+"""Run, measure, report. Each file in this folder is a script: ``python -m experiments.NAME``.
+
+The folders are the rooms that the scripts share, from the lowest up:
+
+- `reporting`: files, pages, plots, pictures.
+- `metrics`: what an assembly is judged by.
+- `jig`: element tests of the soft jig alone.
+- `plan`, `assembly`: ``soft-jig plan`` and ``soft-jig assemble``.
+- `paper`: its experiments, ``soft-jig place``, ``push`` and ``regress``.
+- `cli`: the command line.
+
+A test keeps their imports pointing down.
+"""

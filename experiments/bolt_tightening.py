@@ -9,7 +9,7 @@ The first line runs the whole assembly up to there; the second goes on from a se
 import sys
 from collections.abc import Sequence
 
-from experiments.single import run_operation
+from experiments.cli.single import run_operation
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

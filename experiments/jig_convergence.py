@@ -2,8 +2,8 @@
 
 The holding force of a standing cylinder, a lying cylinder and the plate on its foot against the
 mesh of the frozen bed, the cell of the soft one, the time step and Drake's contact approximation,
-one at a time from the defaults. Vented, 90 kPa: elastic contact and yield alone. Prints a table and
-writes it as `convergence.csv`.
+one at a time from the defaults. Vented, 90 kPa: elastic contact and yield alone. Prints a table
+with the change over the last refinement and writes it as `convergence.csv`.
 
 The approximation in use is "lagged", by argument and not by measurement: it keeps Hunt-Crossley
 dissipation, and its friction is Coulomb's with the normal force of the step before. "sap" replaces
@@ -14,24 +14,26 @@ between.
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import tyro
 
 from cell import load_product
 from cell.soft_jig import JigParameters
-from experiments.element_rig import ElementRig
-from experiments.jig_element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
-from experiments.specimens import Prism, ProductPart, Specimen
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
+from experiments.jig.specimens import Prism, ProductPart, Specimen
 
 DEPTH = 0.010
+# Coarse to fine [m], [s]; the defaults are among them.
+MESH_SIZES = (10e-3, 5e-3, 2.5e-3)
+CELLS = (2e-3, 1.5e-3, 1e-3, 0.75e-3)
 STEPS = (2e-3, 1e-3, 0.5e-3)
 APPROXIMATIONS = ("lagged", "similar", "sap")
-# Coarse to fine; the middle one is the default.
-SCALES = (2.0, 1.0, 0.5)
 
 
 @dataclass(frozen=True)
@@ -46,23 +48,17 @@ class Setting:
 
 
 def settings() -> Iterator[Setting]:
-    """Yield the variations; the defaults come first."""
+    """Yield the variations, coarse to fine; the default is in every sequence."""
     params = parameters()
-    yield Setting("default", "", params)
-    for scale in SCALES:
-        if scale == 1.0:
-            continue
-        for name in ("edge", "ring", "layer"):
-            value = scale * getattr(params.jammed, name)
-            jammed = replace(params.jammed, **{name: value})
-            yield Setting(f"mesh {name}", f"{value * 1e3:g} mm", replace(params, jammed=jammed))
-        cell = params.bag.cell * (scale if scale < 1 else 4 / 3)
+    for size in MESH_SIZES:
+        jammed = replace(params.jammed, mesh_size=size)
+        yield Setting("mesh size", f"{size * 1e3:g} mm", replace(params, jammed=jammed))
+    for cell in CELLS:
         bag = replace(params.bag, cell=cell)
         yield Setting("bed cell", f"{cell * 1e3:g} mm", replace(params, bag=bag))
     for step in STEPS:
-        if step != 1e-3:
-            yield Setting("time step", f"{step * 1e3:g} ms", params, time_step=step)
-    for approximation in APPROXIMATIONS[1:]:
+        yield Setting("time step", f"{step * 1e3:g} ms", params, time_step=step)
+    for approximation in APPROXIMATIONS:
         yield Setting("approximation", approximation, params, approximation=approximation)
 
 
@@ -102,6 +98,22 @@ def across(rig: ElementRig) -> np.ndarray:
     return np.eye(3)[int(np.argmin(np.ptp(corners, axis=0)[:2]))]
 
 
+def last_refinement(rows: Sequence[Sequence[Any]]) -> dict[str, list[float]]:
+    """Return what each varied number changes by from its last but one value to its last.
+
+    Args:
+        rows: Name of what is varied, its value, and one force per specimen [N].
+
+    Returns:
+        Relative changes, one per specimen; without "approximation", which has no finer end.
+    """
+    changes = {}
+    for varied in dict.fromkeys(row[0] for row in rows if row[0] != "approximation"):
+        before, last = [np.array(row[2:], dtype=float) for row in rows if row[0] == varied][-2:]
+        changes[varied] = list(last / before - 1)
+    return changes
+
+
 def main(out: Path = Path("out/convergence")) -> None:
     """Run the study, print the table and write it."""
     out.mkdir(parents=True, exist_ok=True)
@@ -110,9 +122,10 @@ def main(out: Path = Path("out/convergence")) -> None:
     for setting in settings():
         forces = [holding_force(part, setting) for part in parts.values()]
         rows.append([setting.varied, setting.value, *forces])
-        print(
-            f"{setting.varied:14s} {setting.value:8s}", *(f"{f:7.2f} N" for f in forces), flush=True
-        )
+        values = "".join(f"{force:9.2f} N" for force in forces)
+        print(f"{setting.varied:14s} {setting.value:8s}{values}", flush=True)
+    for varied, changes in last_refinement(rows).items():
+        print(f"{varied:14s} {'last':8s}" + "".join(f"{change:+9.1%}  " for change in changes))
     with (out / "convergence.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
         writer.writerow(["varied", "value", *(f"{name} [N]" for name in parts)])

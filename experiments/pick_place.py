@@ -8,7 +8,7 @@ The planner says which part that is and which side is up.
 import sys
 from collections.abc import Sequence
 
-from experiments.single import run_operation
+from experiments.cli.single import run_operation
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

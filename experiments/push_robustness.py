@@ -31,12 +31,12 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 from cell.config import CellConfig
 from cell.errors import CellError
 from cell.loading import load_product
-from experiments.case_plots import PAPER_MEANS
-from experiments.cases import run_cases
-from experiments.cli import BadUsage, Common
-from experiments.output import output_folder, write_json
-from experiments.place_push import cases_of
-from experiments.results import versions
+from experiments.cli.common import BadUsage, Common
+from experiments.paper.case_plots import PAPER_MEANS
+from experiments.paper.cases import run_cases
+from experiments.paper.place_push import cases_of
+from experiments.reporting.output import output_folder, write_json
+from experiments.reporting.provenance import versions
 
 # Path in the configuration -> its range in the sources, for the table; the cloud is ±10 %.
 PARAMETERS = {
@@ -59,7 +59,7 @@ AS_CONFIGURED = "as configured"
 GRAVITY = 9.81  # [m/s2]
 NUMERICS = {
     "half the time step": {"simulation.time_step": 5e-4},
-    "finer bed mesh": {"jig.bag.cell": 0.001, "jig.jammed.edge": 0.008},
+    "finer bed mesh": {"jig.bag.cell": 0.001, "jig.jammed.mesh_size": 0.0035},
     "approximation similar": {"simulation.contact_approximation": "similar"},
     "approximation sap": {"simulation.contact_approximation": "sap"},
 }

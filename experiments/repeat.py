@@ -23,9 +23,10 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.errors import CellError
 from cell.loading import load_product
-from experiments.cli import Assemble, BadUsage
-from experiments.criteria import LIMITS, Limit
-from experiments.output import output_folder, write_json
+from experiments.cli.assemble import Assemble
+from experiments.cli.common import BadUsage
+from experiments.metrics.criteria import LIMITS, Limit
+from experiments.reporting.output import output_folder, write_json
 
 
 @dataclass(frozen=True)

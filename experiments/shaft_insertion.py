@@ -9,7 +9,7 @@ The first line places the part on the jig before; the second goes on from where 
 import sys
 from collections.abc import Sequence
 
-from experiments.single import run_operation
+from experiments.cli.single import run_operation
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -16,7 +16,7 @@ import cell.loading as loading
 from cell.errors import BadPart, CellError, UnknownName
 from cell.identical import handedness, identical_parts
 from cell.loading import DEFAULT_DENSITY, load_product
-from experiments.cli import main
+from experiments.cli.main import main
 
 PLATE = box((40, 40, 10), (-20, -20, 0)) - rod(6, -1, 11, 32) - rod(6, -1, 11).translate([12, 0, 0])
 PIN = rod(6, 0, 20, 32)

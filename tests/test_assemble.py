@@ -17,13 +17,13 @@ from cell.phase import Outcome, Phase, after
 from cell.product import Fit, Product
 from cell.simulation import Simulation
 from cell.state import State, read_state, restore_state, save_state
-from experiments import run as run_module
 from experiments import shaft_insertion
-from experiments.assemble import run_assemble, run_job
-from experiments.job import Job
-from experiments.prepare import Disturbance, running_cell
-from experiments.record import OperationRecord
-from experiments.run import Run, go_on
+from experiments.assembly import run as run_module
+from experiments.assembly.assemble import run_assemble, run_job
+from experiments.assembly.job import Job
+from experiments.assembly.prepare import Disturbance, running_cell
+from experiments.assembly.run import Run, go_on
+from experiments.metrics.record import OperationRecord
 from planning.fixing.planner import plan
 from planning.operations import insert_shaft
 from planning.operations.carry_out import phases

@@ -10,7 +10,6 @@ import trimesh
 from numpy.typing import NDArray
 
 from cell.soft_jig.bed import Bed
-from cell.soft_jig.collar import steepest_wall
 from cell.soft_jig.parameters import BagParameters, SoilParameters
 from cell.soft_jig.samples import SurfaceSamples
 
@@ -144,6 +143,13 @@ def test_shoulder_sinks_beside_the_part_as_in_a_free_dome(punch: SurfaceSamples)
     for at, expected in ((19, 8.4), (21, 5.6), (23, 4.0)):
         assert fall[np.abs(radius - at) < 1].mean() == pytest.approx(expected, rel=0.3)
     assert balance(bed) == pytest.approx(0.0, abs=1e-12)
+
+
+def steepest_wall(confinement: float, soil: SoilParameters) -> float:
+    """Return the height of a vertical cut that stands under a confining pressure [Pa], in m."""
+    cohesion = confinement * np.tan(soil.friction_angle)
+    root_kp = np.tan(np.pi / 4 + soil.friction_angle / 2)
+    return float(4 * cohesion * root_kp / soil.bead_weight)
 
 
 def test_upright_walls_stand_under_the_membrane(punch: SurfaceSamples) -> None:

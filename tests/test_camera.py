@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from experiments.camera import SCREW_RADIUS, Camera, metres_per_pixel, seen_displacement
+from experiments.paper.camera import SCREW_RADIUS, Camera, metres_per_pixel, seen_displacement
 
 X_WJ = RigidTransform([0.0, 0.15, 0.2])
 # A click is off by half a pixel; the mean of four by less, and there are two pictures.

@@ -8,8 +8,8 @@ from types import ModuleType
 import pytest
 
 from cell.errors import BadOrder, CellError
-from experiments.cli import main, one_line, parse
-from experiments.plan_options import PlanOptions
+from experiments.cli.main import main, one_line, parse
+from experiments.plan.options import PlanOptions
 
 
 @pytest.fixture
@@ -31,7 +31,7 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
         calls.append(options)
         return 0
 
-    for name, function in (("plan_command", run_plan), ("assemble", run_assemble)):
+    for name, function in (("plan.command", run_plan), ("assembly.assemble", run_assemble)):
         module = ModuleType(f"experiments.{name}")
         setattr(module, function.__name__, function)
         monkeypatch.setitem(sys.modules, module.__name__, module)

@@ -8,8 +8,8 @@ from scipy.spatial import KDTree
 
 from cell import load_product
 from cell.soft_jig import JigState, SurfaceSamples
-from experiments.element_rig import ElementRig
-from experiments.specimens import ProductPart
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.specimens import ProductPart
 
 # Axis of the part frame that points up, by part and posture.
 POSTURES = {
@@ -77,3 +77,16 @@ def test_part_rests_in_the_imprint(held) -> None:
             areas.append(mesh.area(face))
     assert 0 < np.average(depths, weights=areas) < 0.3e-3
     assert np.average(np.array(depths) < 0.3e-3, weights=areas) > 0.9
+
+
+def test_only_the_motors_terminals_and_boss_are_pins(held) -> None:
+    """Standing, it has 106 mm2 of rear boss and 82 mm2 of terminals in the beads; else slivers."""
+    rig, *_ = held
+    (pins,) = rig.jig.holding.pins.values()
+    points = pins.p_PS
+    standing = rig.part.part.name == "motor" and bool(np.allclose(rig.part.up, (0, 0, 1)))
+    terminals = np.abs(np.hypot(points[:, 0], points[:, 1]) - 0.0112) < 0.0016
+    boss = np.hypot(points[:, 0], points[:, 1]) < 0.0077
+    assert pins.areas[boss].sum() == pytest.approx(106e-6 if standing else 0.0, abs=8e-6)
+    assert pins.areas[terminals].sum() == pytest.approx(82e-6 if standing else 0.0, abs=8e-6)
+    assert pins.areas[~(boss | terminals)].sum() < 6e-6

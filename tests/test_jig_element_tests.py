@@ -5,9 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from experiments.jig_element_tests import (
+from experiments.jig.element_tests import (
     CYLINDER,
-    Row,
     frozen_punch,
     held,
     lateral_formula,
@@ -15,7 +14,8 @@ from experiments.jig_element_tests import (
     reference,
     residual,
 )
-from experiments.jig_element_tests import UP as Z
+from experiments.jig.element_tests import UP as Z
+from experiments.jig_element_tests import Row
 
 
 def test_reference_has_a_force_for_every_depth() -> None:

@@ -8,6 +8,17 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ALLOWED = {"cell": set(), "planning": {"cell"}, "experiments": {"cell", "planning"}}
 SOURCES = sorted(f for p in [*ALLOWED, "tests"] for f in (ROOT / p).rglob("*.py"))
+# The rooms of experiments, from the lowest up, each with those that it may use. The files beside
+# them are scripts: they may use any room, and nothing uses them.
+ROOMS = {
+    "reporting": set(),
+    "metrics": set(),
+    "jig": set(),
+    "plan": {"reporting"},
+    "assembly": {"reporting", "metrics"},
+    "paper": {"reporting", "metrics"},
+    "cli": {"reporting", "plan", "assembly", "paper"},
+}
 MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
 
 
@@ -15,7 +26,12 @@ def imported_modules(file: Path) -> set[str]:
     """Return the dotted names of the modules that a source file imports, at any level."""
     nodes = list(ast.walk(ast.parse(file.read_text())))
     names = {alias.name for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    return names | {node.module or "" for node in nodes if isinstance(node, ast.ImportFrom)}
+    for node in nodes:
+        if isinstance(node, ast.ImportFrom):
+            module = node.module or ""
+            # `from experiments import x` may name a module as well.
+            names |= {module, *(f"{module}.{alias.name}" for alias in node.names)}
+    return names
 
 
 def name_of(file: Path) -> str:
@@ -29,6 +45,29 @@ def test_imports_point_one_way(package: str) -> None:
         roots = {name.split(".")[0] for name in imported_modules(file)}
         beyond = (roots & set(ALLOWED)) - {package} - ALLOWED[package]
         assert not beyond, f"{name_of(file)} imports {sorted(beyond)}"
+
+
+def used_of_experiments(file: Path) -> set[str]:
+    """Return the rooms and scripts of experiments that a source file imports."""
+    names = [name.split(".") for name in imported_modules(file)]
+    return {name[1] for name in names if name[0] == "experiments" and len(name) > 1}
+
+
+def test_every_room_is_known() -> None:
+    assert set(ROOMS) == {file.parent.name for file in (ROOT / "experiments").glob("*/*.py")}
+
+
+@pytest.mark.parametrize("room", ROOMS)
+def test_rooms_use_only_those_below(room: str) -> None:
+    for file in (ROOT / "experiments" / room).rglob("*.py"):
+        beyond = used_of_experiments(file) - {room} - ROOMS[room]
+        assert not beyond, f"{name_of(file)} uses {sorted(beyond)}"
+
+
+def test_scripts_use_rooms_and_not_each_other() -> None:
+    for file in (ROOT / "experiments").glob("*.py"):
+        beyond = used_of_experiments(file) - set(ROOMS)
+        assert not beyond, f"{name_of(file)} uses {sorted(beyond)}"
 
 
 @pytest.mark.parametrize("file", SOURCES, ids=name_of)

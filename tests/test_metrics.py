@@ -10,14 +10,14 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.builder import Cell
 from cell.loading import load_product
-from experiments.criteria import LIMITS, failed_checks
 from experiments.metrics.bolts import advance, clamp_target, standing, torque_shares, trip
 from experiments.metrics.common import force_plate_peaks, moved
+from experiments.metrics.criteria import LIMITS, failed_checks
 from experiments.metrics.insert import riders_standing, seat_errors
 from experiments.metrics.loose import in_hole, measure_set_aside
 from experiments.metrics.place import placement_errors
-from experiments.record import OperationRecord, PhaseRecord, rows_between
-from experiments.snapshot import Snapshot, Wrench
+from experiments.metrics.record import OperationRecord, PhaseRecord, rows_between
+from experiments.metrics.snapshot import Snapshot, Wrench
 from planning.operations.sequence import Operation
 
 PRODUCT = load_product("motor_unit")

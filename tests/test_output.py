@@ -7,7 +7,13 @@ import numpy as np
 import pytest
 
 from cell.errors import CellError
-from experiments.output import output_folder, whole_file, write_arrays, write_json, write_text
+from experiments.reporting.output import (
+    output_folder,
+    whole_file,
+    write_arrays,
+    write_json,
+    write_text,
+)
 
 
 def test_interrupted_file_leaves_the_old_one(tmp_path: Path) -> None:

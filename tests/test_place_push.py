@@ -7,14 +7,14 @@ import numpy as np
 import pytest
 
 from cell import CellConfig
-from experiments.case_results import Experiment, by_outcome, verdict
-from experiments.cases import Case, CaseResult, TrialResult
-from experiments.cli import main
-from experiments.metrics.trial import force_peaks
-from experiments.place_push import run_experiment
-from experiments.postures import POSTURES, PUSHES
-from experiments.regress import SUITES, TOLERANCES, drifts
-from experiments.trial import Trial
+from experiments.cli.main import main
+from experiments.paper.case_results import Experiment, by_outcome, verdict
+from experiments.paper.cases import Case, CaseResult, TrialResult
+from experiments.paper.place_push import run_experiment
+from experiments.paper.postures import POSTURES, PUSHES
+from experiments.paper.regress import SUITES, TOLERANCES, drifts
+from experiments.paper.trial import Trial
+from experiments.paper.trial_metrics import force_peaks
 
 
 def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture) -> str:

@@ -16,10 +16,10 @@ from tiny_products import (
     tube_and_pins,
 )
 
-import experiments.plan_command as plan_command
+import experiments.plan.command as plan_command
 from cell.errors import CellError
-from experiments.plan_command import run_plan
-from experiments.plan_options import PlanOptions
+from experiments.plan.command import run_plan
+from experiments.plan.options import PlanOptions
 from planning import FixingPlan, load_plan, plan, save_plan
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.explain import explanation, stop_text

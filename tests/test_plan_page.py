@@ -19,13 +19,13 @@ from cell import CellConfig
 from cell.loading import load_product
 from cell.product import Product
 from cell.soft_jig import BagParameters
-from experiments.plan_command import save_matrices
-from experiments.plan_page import page
-from experiments.plan_page.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
-from experiments.plan_page.heatmaps import contact_map, direction_maps
-from experiments.plan_page.page import write_page
-from experiments.plan_page.scene import projected, view_of
-from experiments.render import rendering_problem
+from experiments.plan import page
+from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
+from experiments.plan.command import save_matrices
+from experiments.plan.heatmaps import contact_map, direction_maps
+from experiments.plan.page import write_page
+from experiments.plan.scene import projected, view_of
+from experiments.reporting.render import rendering_problem
 from planning import plan
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.remark import bolt_remarks

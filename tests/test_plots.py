@@ -6,7 +6,13 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from experiments.plots import DPI, SIZE, plot_force_plate, plot_insertion_force, plot_torque
+from experiments.reporting.plots import (
+    DPI,
+    SIZE,
+    plot_force_plate,
+    plot_insertion_force,
+    plot_torque,
+)
 
 N = 50
 RAMP = np.linspace(0.0, 1.0, N)

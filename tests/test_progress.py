@@ -4,9 +4,9 @@ import io
 
 from rich.console import Console
 
-from experiments.criteria import FailedCheck
-from experiments.progress import Progress, result_table
-from experiments.run import StepResult
+from experiments.assembly.progress import Progress, result_table
+from experiments.assembly.run import StepResult
+from experiments.metrics.criteria import FailedCheck
 
 GOOD = StepResult("place motor", "pick_place", "success", 11.9, 30.0, {}, ())
 CHECKS = (

@@ -12,8 +12,8 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from experiments import render
-from experiments.render import NoRendering, View, rendering_problem, take_picture
+from experiments.reporting import render
+from experiments.reporting.render import NoRendering, View, rendering_problem, take_picture
 
 # From +y, so that +x is on the left of the picture.
 VIEW = View(p_WC=(0.0, 2.0, 0.5), p_WTarget=(0.0, 0.0, 0.5), width=120, height=80)

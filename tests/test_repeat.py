@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from experiments import repeat
-from experiments.criteria import Limit
+from experiments.metrics.criteria import Limit
 
 
 def test_every_seed_is_run_and_its_failure_reported(tmp_path: Path) -> None:

@@ -13,7 +13,7 @@ from cell.config import CellConfig
 from cell.loading import load_product
 from cell.phase import Phase, after
 from cell.simulation import Simulation
-from experiments.replay import MEMBRANE_PERIOD, Replay, membrane_path
+from experiments.assembly.replay import MEMBRANE_PERIOD, Replay, membrane_path
 
 
 def test_nothing_wanted_adds_nothing() -> None:

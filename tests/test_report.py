@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from experiments.report import write_report
+from experiments.reporting.report import write_report
 
 VOID = {"meta", "img", "br"}
 PNG = base64.b64decode(

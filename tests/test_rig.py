@@ -11,12 +11,12 @@ from cell.errors import BadPart, UnknownName
 from cell.rig import HandPose, build_push_rig
 from cell.rig_simulation import RigSimulation, smooth_path, stroke_path
 from cell.soft_jig import SurfaceSamples
-from experiments.cases import Case, case_seed, judged, wilson
-from experiments.metrics.trial import tilt_between
-from experiments.postures import AXES, POSTURES, PUSHES, chosen
-from experiments.push_rule import push_line
-from experiments.rig_hand import RigBench, tip_pose
-from experiments.trial import Disturbance, check_fits, planned_pose, run_trial
+from experiments.paper.cases import Case, case_seed, judged, wilson
+from experiments.paper.postures import AXES, POSTURES, PUSHES, chosen
+from experiments.paper.push_rule import push_line
+from experiments.paper.rig_hand import RigBench, tip_pose
+from experiments.paper.trial import Disturbance, check_fits, planned_pose, run_trial
+from experiments.paper.trial_metrics import tilt_between
 
 
 @pytest.fixture(scope="module")

@@ -11,12 +11,12 @@ from cell.errors import CellError
 from cell.phase import PhaseFailed
 from cell.rig import SLIDE_DRIVE, TURN_DRIVE
 from cell.stroke import Stroke
-from experiments.cases import Case, check_hand, judged
-from experiments.metrics.trial import tilt_between
-from experiments.postures import POSTURES, PUSHES
-from experiments.push_rule import leading, push_line
-from experiments.robot_hand import RobotBench, RobotHand
-from experiments.trial import Disturbance, run_trial
+from experiments.paper.cases import Case, check_hand, judged
+from experiments.paper.postures import POSTURES, PUSHES
+from experiments.paper.push_rule import leading, push_line
+from experiments.paper.robot_hand import RobotBench, RobotHand
+from experiments.paper.trial import Disturbance, run_trial
+from experiments.paper.trial_metrics import tilt_between
 from planning.motion.kinematics import tool_pose
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import reachable_grasps

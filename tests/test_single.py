@@ -6,8 +6,9 @@ from types import ModuleType
 
 import pytest
 
-from experiments import bolt_tightening, pick_place, shaft_insertion, single
-from experiments.job import Job
+from experiments import bolt_tightening, pick_place, shaft_insertion
+from experiments.assembly.job import Job
+from experiments.cli import single
 
 SCRIPTS = {
     "pick_place": (pick_place, "pick_place"),

@@ -9,8 +9,8 @@ from test_jam_postures import POSTURES, PRESS_FORCE
 from cell import load_product
 from cell.soft_jig import JigState
 from cell.soft_jig.stable import Carried, largest_stiffness, normal_rows
-from experiments.element_rig import ElementRig
-from experiments.specimens import ProductPart
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.specimens import ProductPart
 
 
 def released(posture: str, time_step: float):

@@ -24,5 +24,6 @@ def test_wheel_carries_every_model_file_and_no_tests(tmp_path: Path) -> None:
     packed = set(zipfile.ZipFile(wheel).namelist())
     models = {p.relative_to(ROOT).as_posix() for p in (ROOT / "models").rglob("*") if p.is_file()}
     assert models <= packed
-    assert "experiments/report.css" in packed
+    assert "experiments/reporting/report.css" in packed
+    assert "experiments/jig/element_reference.yaml" in packed
     assert not any(name.startswith("tests/") for name in packed)

@@ -11,8 +11,8 @@ from cell.soft_jig import JigParameters
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.parameters import SoilParameters
 from cell.soft_jig.yielding import Patch, Strength, returned
-from experiments.element_rig import ElementRig
-from experiments.specimens import Prism
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.specimens import Prism
 
 UP = np.array([0.0, 0.0, 1.0])
 

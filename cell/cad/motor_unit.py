@@ -191,8 +191,8 @@ def bolt_solid() -> Manifold:
 def motor_pieces() -> list[Piece]:
     """Return the motor's contact pieces.
 
-    Rear boss and terminals have none: they sink into the membrane, which the bed's own surface
-    samples see, and nothing else ever reaches them.
+    Rear boss and terminals have none: they sink into the beads, which meet their real surface
+    (`cell.soft_jig.pins`), and nothing else ever reaches them.
     """
     metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
     return [

@@ -7,7 +7,7 @@ at first by as much as is displaced, in the end by a few percent of the bag. In 
 ridge stands nearer, 16 mm from the rim, and the shoulder hardly sinks.
 
 An imprint's wall may stand upright: beads under a confining pressure p have the cohesion
-c = p tan(phi), and a vertical cut in them is stable up to 4 c sqrt(Kp) / gamma (`steepest_wall`),
+c = p tan(phi), and a vertical cut in them is stable up to 4 c sqrt(Kp) / gamma,
 which is far higher than any imprint unless the membrane is slack and the beads weigh nothing.
 """
 
@@ -60,13 +60,6 @@ class Ledger:
 def dilation(swept: float, soil: SoilParameters) -> float:
     """Return the volume that the beads have gained after so much was displaced [m3]."""
     return float(soil.dilation_limit * -np.expm1(-swept / soil.dilation_scale))
-
-
-def steepest_wall(confinement: float, soil: SoilParameters) -> float:
-    """Return the height of a vertical cut that stands under a confining pressure [Pa], in m."""
-    cohesion = confinement * np.tan(soil.friction_angle)
-    root_kp = np.tan(np.pi / 4 + soil.friction_angle / 2)
-    return float(4 * cohesion * root_kp / soil.bead_weight)
 
 
 def shoulder(

@@ -54,6 +54,19 @@ class TetMesh:
         )
         return faces[first[count == 1]]
 
+    def contains(self, points: Array) -> NDArray[np.bool_]:
+        """Say which points (k, 3) are in one of the tetrahedra."""
+        inside = np.zeros(len(points), dtype=bool)
+        near = np.arange(len(points))
+        corners = self.vertices[self.tetrahedra]
+        edges = np.linalg.inv(corners[:, 1:] - corners[:, :1])
+        for corner, inverse in zip(corners[:, 0], edges, strict=True):
+            weights = (points[near] - corner) @ inverse
+            within = (weights.min(axis=1) >= 0) & (weights.sum(axis=1) <= 1)
+            inside[near[within]] = True
+            near = near[~within]
+        return inside
+
     def largest_depth(self) -> float:
         """Return the largest distance of a vertex from the surface [m].
 

@@ -18,6 +18,7 @@ from pydrake.math import RotationMatrix
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import CoulombFriction, ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import RigidBody
+from pydrake.systems.framework import Context
 
 from cell.errors import CellError
 from cell.soft_jig.columns import TetMesh
@@ -87,3 +88,9 @@ def lean_of(R_JP: RotationMatrix) -> Array:
     axes = R_JP.matrix()
     up = axes[:, np.argmax(np.abs(axes[2]))]
     return up[:2] / up[2]
+
+
+def inertia_in_jig(context: Context, body: RigidBody, X_JP: tuple[Array, Array]) -> Array:
+    """Return the spatial inertia (6, 6) of a part about its origin in J, angular part first."""
+    M_P = body.CalcSpatialInertiaInBodyFrame(context)
+    return M_P.ReExpress(RotationMatrix(X_JP[0])).CopyToFullMatrix6()

@@ -1,4 +1,4 @@
-"""What holds a part in the frozen bed besides elastic contact: suction, and strength that ends."""
+"""What holds a part in the frozen bed besides elastic contact: suction, pins, yielding beads."""
 
 from __future__ import annotations
 
@@ -15,6 +15,7 @@ from pydrake.systems.framework import Context
 
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.parameters import JigParameters
+from cell.soft_jig.pins import Pins
 from cell.soft_jig.suction import Seal
 from cell.soft_jig.yielding import Patch, Strength, returned
 
@@ -30,6 +31,7 @@ class Holding:
 
     Attributes:
         seals: What seals under each held body, by its name.
+        pins: What each held body has among the beads, by its name.
         since_return: Time since the surface was last moved [s].
     """
 
@@ -38,10 +40,16 @@ class Holding:
     ) -> None:
         self.params = params
         self.seals: dict[str, Seal] = {}
+        self.pins: dict[str, Pins] = {}
         self.since_return = np.inf
         self._plant, self._scene_graph, self._bed = plant, scene_graph, bed
         self._seen: dict[str, tuple[RigidTransform, float, float]] = {}
         self._patches: list[Patch] = []
+
+    def let_go(self) -> None:
+        """Forget every body."""
+        self.seals.clear()
+        self.pins.clear()
 
     def forget(self) -> None:
         """Look at every contact anew: the surface has changed."""
@@ -66,6 +74,29 @@ class Holding:
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
             motion = (X_JP.rotation().matrix(), X_JP.translation())
             yield body, *seal.pull(motion, pressure, self.params.suction)
+
+    def pushes(
+        self,
+        context: Context,
+        X_WJ: RigidTransform,
+        bodies: dict[str, RigidBody],
+        confinement: float,
+    ) -> Iterator[Load]:
+        """Yield each body with what the beads push on its pins, as `pulls`.
+
+        Args:
+            context: Of the plant.
+            X_WJ: Pose of the jig.
+            bodies: The held bodies by name.
+            confinement: Pressure that holds the beads together [Pa].
+        """
+        strength = Strength.of(self.params.soil, self.params.jammed.strength * confinement)
+        for name, body in bodies.items():
+            pins = self.pins.get(name)
+            if pins is not None and len(pins.areas):
+                X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
+                motion = (X_JP.rotation().matrix(), X_JP.translation())
+                yield body, *pins.push(motion, strength)
 
     def reliefs(self, context: Context, X_WJ: RigidTransform, confinement: float) -> Iterator[Load]:
         """Yield each body that the beads cannot carry with what they give way by, as `pulls`."""
@@ -128,7 +159,8 @@ class Holding:
     def state(self) -> dict[str, Any]:
         """Return everything that changes the course of a run."""
         seals = {name: seal.arrays() for name, seal in self.seals.items()}
-        return {"since_return": self.since_return, "seals": seals}
+        pins = {name: pins.arrays() for name, pins in self.pins.items()}
+        return {"since_return": self.since_return, "seals": seals, "pins": pins}
 
     def restore(self, state: dict[str, Any]) -> None:
         """Return to a saved state."""
@@ -136,3 +168,5 @@ class Holding:
         self.since_return = float(state["since_return"])
         seals = state.get("seals", {})
         self.seals = {name: Seal.from_arrays(arrays) for name, arrays in seals.items()}
+        pins = state.get("pins", {})
+        self.pins = {name: Pins.from_arrays(arrays) for name, arrays in pins.items()}

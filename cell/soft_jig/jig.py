@@ -11,12 +11,13 @@ from __future__ import annotations
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
 from enum import Enum
+from itertools import chain
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, Role, SceneGraph
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import BodyIndex, RigidBody
@@ -31,12 +32,14 @@ from cell.soft_jig.drake_values import (
     drake_shape,
     force_row,
     hull_vertices,
+    inertia_in_jig,
     lean_of,
 )
 from cell.soft_jig.holding import Holding
 from cell.soft_jig.parameters import FULL_VACUUM, JigParameters
+from cell.soft_jig.pins import Pins
 from cell.soft_jig.samples import SurfaceSamples
-from cell.soft_jig.suction import Seal, SealedPatch
+from cell.soft_jig.suction import Seal
 from cell.soft_jig.visual import membrane_shape
 
 Array = NDArray[np.float64]
@@ -64,6 +67,7 @@ class SoftJig:
         bed: The surface and its constitutive model.
         state: Where the jig is in INFLATED -> SOFT -> JAMMED -> SOFT.
         pressure: Confining pressure in the bag [Pa].
+        holding: What holds each body while jammed: seals, pins, yield.
         filters_lifted: Given the root context, lifts every passing collision filter for the time
             of a swap, which Drake demands; whoever sets such filters provides it.
     """
@@ -91,7 +95,7 @@ class SoftJig:
         self._pressing: dict[str, tuple[RigidBody, SurfaceSamples]] = {}
         self._forces: list[ExternallyAppliedSpatialForce] = []
         self._since_drawn = 0.0
-        self._holding = Holding(plant, scene_graph, self._bed_id, params)
+        self.holding = Holding(plant, scene_graph, self._bed_id, params)
 
     @staticmethod
     def add(
@@ -166,11 +170,6 @@ class SoftJig:
         """The bodies that the soft bed carries."""
         return tuple(body for body, _ in self._pressing.values())
 
-    @property
-    def sealed_patches(self) -> dict[str, list[SealedPatch]]:
-        """The flat contacts of each held body with their sealed fraction; empty unless jammed."""
-        return {name: list(seal.patches) for name, seal in self._holding.seals.items()}
-
     # Simulation.
 
     @property
@@ -195,7 +194,7 @@ class SoftJig:
             return
         self._press(root_context, dt)
         if self._pumping and self.pressure >= vacuum.jam_fraction * vacuum.pressure:
-            self._jam(root_context)
+            self._jam(root_context, dt)
         else:
             self._draw_if_due(root_context, dt)
 
@@ -204,8 +203,7 @@ class SoftJig:
         X_WJ = self.pose(context)
         for body, samples in self._pressing.values():
             X_JP, V_JP = self._motion_in_jig(context, X_WJ, body)
-            M_P = body.CalcSpatialInertiaInBodyFrame(context)
-            inertia = M_P.ReExpress(RotationMatrix(X_JP[0])).CopyToFullMatrix6()
+            inertia = inertia_in_jig(context, body, X_JP)
             force, torque = self.bed.press(X_JP, V_JP, samples, dt, inertia)
             if force.any():
                 self._forces += self._pair(context, X_WJ, body, force, torque)
@@ -243,13 +241,15 @@ class SoftJig:
         ]
 
     def _hold(self, root_context: Context, dt: float) -> None:
-        """Add to the elastic contact what suction pulls and what the beads cannot carry."""
+        """Add to the elastic contact suction, pins, and what the beads cannot carry."""
         context = self._plant.GetMyContextFromRoot(root_context)
-        X_WJ, holding = self.pose(context), self._holding
+        X_WJ, holding = self.pose(context), self.holding
         bodies = {name: body for name, (body, _) in self._pressing.items()}
-        for load in holding.pulls(context, X_WJ, bodies, self.pressure):
-            self._forces += self._pair(context, X_WJ, *load)
-        for load in holding.reliefs(context, X_WJ, self.bed.confinement):
+        for load in chain(
+            holding.pulls(context, X_WJ, bodies, self.pressure),
+            holding.pushes(context, X_WJ, bodies, self.bed.confinement),
+            holding.reliefs(context, X_WJ, self.bed.confinement),
+        ):
             self._forces += self._pair(context, X_WJ, *load)
         mesh = holding.return_mesh(self._mesh, dt)
         if mesh is not None:
@@ -258,30 +258,35 @@ class SoftJig:
 
     # Freezing and drawing.
 
-    def _jam(self, root_context: Context) -> None:
+    def _jam(self, root_context: Context, dt: float) -> None:
         context = self._plant.GetMyContextFromRoot(root_context)
-        X_WJ = self.pose(context)
-        for name in self._pressing:
-            self._holding.seals[name] = self._seal(context, X_WJ, name)
+        X_WJ, holding = self.pose(context), self.holding
+        for name, (body, samples) in self._pressing.items():
+            X_JP, _ = self._motion_in_jig(context, X_WJ, body)
+            lip = self.params.suction.lip
+            holding.seals[name] = Seal.under(self.bed, samples.name, X_JP, lip)
         self.bed.jam(self.params.vacuum.contraction)
         self.state = JigState.JAMMED
+        self._forces = []
+        self._mesh = self._mesh_with_imprint(context, X_WJ)
+        self._install(root_context)
+        for name, (body, samples) in self._pressing.items():
+            X_JP, _ = self._motion_in_jig(context, X_WJ, body)
+            inertia = inertia_in_jig(context, body, X_JP)
+            modulus = self._gradient()
+            holding.pins[name] = Pins.inside(self._mesh, samples, X_JP, modulus, inertia, dt)
+
+    def _mesh_with_imprint(self, context: Context, X_WJ: RigidTransform) -> TetMesh:
         hulls, lean = [], np.zeros(2)
         for body, _ in self._pressing.values():
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
             hulls += self._bed_hulls(body, X_JP)
             lean = lean_of(X_JP.rotation())
-        self._forces = []
-        self._mesh = imprint_mesh(self.bed, self.params.jammed, hulls, lean)
-        self._install(root_context)
-
-    def _seal(self, context: Context, X_WJ: RigidTransform, name: str) -> Seal:
-        body, samples = self._pressing[name]
-        X_JP, _ = self._motion_in_jig(context, X_WJ, body)
-        return Seal.under(self.bed, samples.name, X_JP, self.params.suction.lip)
+        return imprint_mesh(self.bed, self.params.jammed, hulls, lean)
 
     def _show_bed(self, root_context: Context) -> None:
         self._forces = []
-        self._holding.seals.clear()
+        self.holding.let_go()
         self._mesh = bed_mesh(self.bed, self.params.jammed)
         self._install(root_context)
 
@@ -289,7 +294,7 @@ class SoftJig:
         """Replace contact and visible geometry in the Context by the present mesh and surface."""
         context = self._scene_graph.GetMyMutableContextFromRoot(root_context)
         graph, source = self._scene_graph, self._plant.get_source_id()
-        self._holding.forget()
+        self.holding.forget()
         properties = drake_proximity(self._mesh, self.params, self._gradient())
         with self.filters_lifted(root_context):
             # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
@@ -366,7 +371,7 @@ class SoftJig:
             "pressure": self.pressure,
             "pumping": self._pumping,
             "since_drawn": self._since_drawn,
-            "holding": self._holding.state(),
+            "holding": self.holding.state(),
             "vertices": self._mesh.vertices.copy(),
             "tetrahedra": self._mesh.tetrahedra.copy(),
             "forces": np.array([force_row(force) for force in self._forces]).reshape(-1, 10),
@@ -381,7 +386,7 @@ class SoftJig:
         self._mesh = TetMesh(state["vertices"].copy(), state["tetrahedra"].copy())
         self._install(root_context)
         self._since_drawn = float(state["since_drawn"])
-        self._holding.restore(state["holding"])
+        self.holding.restore(state["holding"])
         self._forces = [self._from_row(row) for row in state["forces"]]
 
     def _from_row(self, row: Array) -> ExternallyAppliedSpatialForce:

@@ -9,8 +9,8 @@ from cell.builder import Cell
 from cell.product import Fastener
 from cell.thread import Misfit
 from experiments.metrics.common import Measured, base_moved
-from experiments.record import Arrays, OperationRecord, PhaseRecord, logged_poses, rows_of
-from experiments.snapshot import Snapshot
+from experiments.metrics.record import Arrays, OperationRecord, PhaseRecord, logged_poses, rows_of
+from experiments.metrics.snapshot import Snapshot
 
 # A bolt is snug when its thread carries this share of the clamp force that T = K d F gives.
 SNUG = 0.1

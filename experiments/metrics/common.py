@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
-from experiments.record import OperationRecord
-from experiments.snapshot import Snapshot
+from experiments.metrics.record import OperationRecord
+from experiments.metrics.snapshot import Snapshot
 
 Measured = dict[str, float]
 

@@ -9,8 +9,8 @@ from cell.builder import Cell
 from cell.product import Fit, Product
 from experiments.metrics.bolts import standing
 from experiments.metrics.common import Measured, base_moved
-from experiments.record import Arrays, OperationRecord, logged_poses, rows_of
-from experiments.snapshot import Snapshot
+from experiments.metrics.record import Arrays, OperationRecord, logged_poses, rows_of
+from experiments.metrics.snapshot import Snapshot
 
 INSERTION_PHASES = ("insert", "search", "insert again", "press")
 

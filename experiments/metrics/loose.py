@@ -7,8 +7,8 @@ import numpy as np
 from cell.builder import Cell
 from cell.product import Product
 from experiments.metrics.common import Measured, angle_between, base_moved
-from experiments.record import Arrays, OperationRecord
-from experiments.snapshot import Snapshot
+from experiments.metrics.record import Arrays, OperationRecord
+from experiments.metrics.snapshot import Snapshot
 
 
 def measure_loose_bolts(cell: Cell, record: OperationRecord, log: Arrays) -> Measured:

@@ -12,7 +12,7 @@ from experiments.metrics.common import Measured, force_plate_peaks
 from experiments.metrics.insert import measure_insert
 from experiments.metrics.loose import measure_loose_bolts, measure_set_aside
 from experiments.metrics.place import measure_place
-from experiments.record import Arrays, OperationRecord, rows_between
+from experiments.metrics.record import Arrays, OperationRecord, rows_between
 
 Measure = Callable[[Cell, OperationRecord, Arrays], Measured]
 _MEASURES: dict[str, Measure] = {

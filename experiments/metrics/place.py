@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from experiments.metrics.common import Measured, angle_between
-from experiments.record import (
+from experiments.metrics.record import (
     Arrays,
     OperationRecord,
     PhaseRecord,
@@ -15,7 +15,7 @@ from experiments.record import (
     logged_speed,
     rows_of,
 )
-from experiments.snapshot import Snapshot
+from experiments.metrics.snapshot import Snapshot
 from planning.operations.placement import YAWS, upright
 
 

@@ -1,0 +1,88 @@
+"""``soft-jig assemble``: plan a product, then assemble it in the twin, measured and reported."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from rich.console import Console
+
+from cell.config import CellConfig
+from cell.product import Product
+from experiments.assembly.job import Job
+from experiments.assembly.pictures import Pictures
+from experiments.assembly.prepare import check_models, running_cell
+from experiments.assembly.progress import Progress, result_table
+from experiments.assembly.replay import Replay
+from experiments.assembly.results import write_infeasible, write_results
+from experiments.assembly.run import Run, go_on, read_final_state
+from planning.fixing.explain import stop_text
+from planning.fixing.planner import FixingPlan, plan
+from planning.operations.sequence import NoOperation, Operation, operations
+
+
+def run_assemble(
+    *,
+    product: Product,
+    order: tuple[str, ...] | None,
+    config: CellConfig,
+    seed: int,
+    out: Path,
+    view: bool,
+    replay: Path | None,
+    quiet: bool,
+) -> int:
+    """Plan a product and run its whole assembly; write result, log and report.
+
+    The arguments are those of `Job`.
+
+    Returns:
+        0 if the whole assembly succeeded, else 1.
+
+    Raises:
+        CellError: Product or order cannot be used; nothing is written.
+    """
+    return run_job(Job(product, order, config, seed, out, view, replay, quiet))
+
+
+def run_job(job: Job) -> int:
+    """Plan, run, measure and report; return 0 if everything succeeded, else 1."""
+    console = Console(quiet=job.quiet, highlight=False)
+    check_models(job.product)
+    fixing = plan(job.product, job.order)
+    try:
+        todo = _operations(job, fixing)
+    except NoOperation as reason:
+        console.print(str(reason), markup=False, soft_wrap=True)
+        write_infeasible(job, fixing, str(reason))
+        return 1
+    start = None if job.start is None else read_final_state(job.start)
+    replay = Replay(view=job.view, file=job.replay)
+    if replay.url:
+        console.print(f"Watch at {replay.url}", soft_wrap=True)
+    run = Run(*running_cell(job.product, job.config, job.seed, replay))
+    if start is not None:
+        todo = go_on(run, todo, start)
+    pictures = Pictures(run.simulation)
+    with Progress(console, [operation.name for operation in todo]) as progress:
+        run.watchers = (progress, pictures)
+        run.run(todo)
+    write_results(job, fixing, run, pictures)
+    replay.save()
+    console.print(result_table(run.steps))
+    if run.failure is not None:
+        text = f"Failed in '{run.failure.phase}': {run.failure.evidence}"
+        console.print(text, markup=False, soft_wrap=True)
+    return 0 if run.verdict == "success" else 1
+
+
+def _operations(job: Job, fixing: FixingPlan) -> list[Operation]:
+    """Return the operations of a feasible plan, up to the last one wanted.
+
+    Raises:
+        NoOperation: The plan is infeasible, or no operation carries it out.
+    """
+    if fixing.stop is not None:
+        raise NoOperation(stop_text(fixing))
+    todo = operations(job.product, fixing)
+    kinds = [operation.kind for operation in todo]
+    return todo[: kinds.index(job.last) + 1] if job.last in kinds else todo

@@ -1,0 +1,36 @@
+"""Pictures of a run: the cell and the jig after every step."""
+
+from __future__ import annotations
+
+from cell.simulation import Simulation
+from experiments.assembly.run import StepResult
+from experiments.reporting.html_page import Picture
+from experiments.reporting.render import CELL_VIEW, JIG_VIEW, rendering_problem, take_picture
+
+VIEWS = {"cell": CELL_VIEW, "jig": JIG_VIEW}
+
+
+class Pictures:
+    """Takes pictures where the machine can render.
+
+    Attributes:
+        taken: Caption and PNG each.
+        problem: Why there are none, or None.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self.simulation = simulation
+        self.problem = rendering_problem()
+        self.taken: list[Picture] = []
+
+    def phase(self, name: str) -> None:
+        """Phases are too many to picture."""
+
+    def step(self, step: StepResult) -> None:
+        """Take one picture per view."""
+        if self.problem is None:
+            root, graph = self.simulation.root, self.simulation.cell.scene_graph
+            self.taken += [
+                (f"{step.name} ({name})", take_picture(graph, root, view))
+                for name, view in VIEWS.items()
+            ]

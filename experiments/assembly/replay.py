@@ -1,0 +1,115 @@
+"""The cell in a browser: live, or as a recording that plays offline.
+
+Meshcat records how things move, but not how shapes change. The jig's membrane is therefore shown as
+a film: every surface that it takes is an object of its own, visible for its time only.
+"""
+
+from __future__ import annotations
+
+import logging
+from pathlib import Path
+
+import numpy as np
+from pydrake.geometry import (
+    Meshcat,
+    MeshcatParams,
+    MeshcatVisualizer,
+    MeshcatVisualizerParams,
+    Rgba,
+    Role,
+)
+from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
+
+from cell.builder import Cell
+from cell.errors import UnknownName
+from cell.soft_jig.jig import MEMBRANE, SILICONE_COLOR
+from cell.soft_jig.visual import membrane_shape
+from experiments.reporting.output import write_text
+
+FRAME_PERIOD = 0.05  # Between two pictures [s] [A].
+MEMBRANE_PERIOD = 0.1  # Between two surfaces of the membrane [s] [A]; each costs about 0.3 MB.
+CAMERA = ((0.8, 1.9, 1.25), (0.0, 0.05, 0.25))  # Where it stands and what it looks at, in W [m].
+
+
+class MembraneFilm(LeafSystem):
+    """Shows the jig's surface each time it has changed.
+
+    Args:
+        cell: Whose jig.
+        meshcat: Where to show it.
+        still: Path of the surface that the visualizer shows, to be hidden.
+    """
+
+    def __init__(self, cell: Cell, meshcat: Meshcat, still: str) -> None:
+        super().__init__()
+        self.cell, self.meshcat, self.still = cell, meshcat, still
+        self.count = 0
+        self._shown: np.ndarray | None = None
+        self.DeclarePeriodicPublishEvent(MEMBRANE_PERIOD, 0.0, self._publish)
+
+    def _publish(self, context: Context) -> None:
+        surface = self.cell.soft_jig.bed.heights
+        if self._shown is not None and np.array_equal(surface, self._shown):
+            return
+        self._shown = surface.copy()
+        path, time = f"/membrane/{self.count}", context.get_time()
+        self.meshcat.SetObject(path, membrane_shape(self.cell.soft_jig.bed), Rgba(*SILICONE_COLOR))
+        self.meshcat.SetTransform(path, self.cell.X_WJ)
+        if self.count:
+            self.meshcat.SetProperty(path, "visible", False, 0.0)
+            self.meshcat.SetProperty(f"/membrane/{self.count - 1}", "visible", False, time)
+        self.meshcat.SetProperty(path, "visible", True, time)
+        # Each time: the visualizer forgets it when a simulation is initialized.
+        self.meshcat.SetProperty(self.still, "visible", False, 0.0)
+        self.count += 1
+
+
+class Replay:
+    """Meshcat for one run; does nothing when neither a view nor a file is wanted.
+
+    Args:
+        view: Whether a person watches.
+        file: Where to write the recording; None for none.
+    """
+
+    def __init__(self, *, view: bool, file: Path | None) -> None:
+        self.view, self.file = view, file
+        logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat reports its port.
+        self.meshcat = Meshcat(MeshcatParams(show_stats_plot=False)) if view or file else None
+
+    @property
+    def url(self) -> str | None:
+        """Where to watch, if somebody wants to."""
+        return self.meshcat.web_url() if self.view and self.meshcat else None
+
+    def add_to(self, builder: DiagramBuilder, cell: Cell) -> None:
+        """Connect to a diagram under construction."""
+        if self.meshcat is None:
+            return
+        params = MeshcatVisualizerParams(publish_period=FRAME_PERIOD)
+        MeshcatVisualizer.AddToBuilder(builder, cell.scene_graph, self.meshcat, params)
+        still = membrane_path(cell, params.prefix)
+        builder.AddSystem(MembraneFilm(cell, self.meshcat, still))
+        self.meshcat.SetCameraPose(*CAMERA)
+        if self.file is not None:
+            self.meshcat.StartRecording(
+                frames_per_second=1.0 / FRAME_PERIOD, set_visualizations_while_recording=self.view
+            )
+
+    def save(self) -> None:
+        """Write the recording, if one is wanted."""
+        if self.meshcat is not None and self.file is not None:
+            self.meshcat.StopRecording()
+            self.meshcat.PublishRecording()
+            write_text(self.file, self.meshcat.StaticHtml())
+
+
+def membrane_path(cell: Cell, prefix: str) -> str:
+    """Return where the visualizer puts the membrane that the film stands in for."""
+    inspector = cell.scene_graph.model_inspector()
+    for geometry in inspector.GetAllGeometryIds(Role.kIllustration):
+        name = inspector.GetName(geometry)
+        if name.split("::")[-1] == MEMBRANE:
+            frame = inspector.GetName(inspector.GetFrameId(geometry))
+            return f"{prefix}/{frame}/{name}".replace("::", "/")
+    raise UnknownName("visible geometry", MEMBRANE, ())

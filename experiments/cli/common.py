@@ -1,0 +1,55 @@
+"""What the commands share: options, the refusal of a wrong one, how an order is written."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import UseAppendAction, arg
+
+from cell.errors import CellError
+
+if TYPE_CHECKING:
+    from cell.config import CellConfig
+
+# What a command needs is imported when it runs: Drake takes a second that --help can do without.
+
+
+class BadUsage(CellError):
+    """A command line that cannot be understood."""
+
+
+@dataclass(frozen=True)
+class Common:
+    """Options that every command takes."""
+
+    seed: int = 0
+    """Seed of everything random: the same seed gives the same result, bit for bit."""
+
+    out: Annotated[Path, arg(metavar="DIR")] = Path("out")
+    """Folder for the results; made if it does not exist."""
+
+    config: Annotated[str, arg(metavar="FILE")] = "default"
+    """Configuration: a YAML file (it may be partial), or a name in models/config."""
+
+    overrides: Annotated[
+        UseAppendAction[tuple[str, ...]], arg(name="set", metavar="KEY=VALUE")
+    ] = ()
+    """Change one value of the configuration, for example simulation.time_step=0.002. Repeatable."""
+
+    quiet: bool = False
+    """Print nothing but errors."""
+
+    def load_config(self) -> CellConfig:
+        """Return the configuration that the options describe, checked."""
+        from cell.config import CellConfig
+
+        if self.seed < 0:
+            raise BadUsage(f"--seed must be >= 0, not {self.seed}.")
+        return CellConfig.load(self.config, self.overrides)
+
+
+def split_order(text: str | None) -> tuple[str, ...] | None:
+    """Return the items of an order written "a,b,c"; None stays None."""
+    return None if text is None else tuple(item.strip() for item in text.split(","))

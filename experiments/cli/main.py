@@ -1,0 +1,89 @@
+"""The command line: ``soft-jig COMMAND ...``; commands by name, parsing, exit codes.
+
+Exit code 0: done and the verdict is success. 1: it ran and the verdict is failure. 2: bad input,
+with one line on stderr that names the culprit and the alternatives.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import re
+import sys
+from collections.abc import Sequence
+
+import tyro
+from tyro.conf import FlagCreatePairsOff
+
+from cell.errors import CellError, UnknownName
+from experiments.cli.assemble import Assemble
+from experiments.cli.common import BadUsage
+from experiments.cli.paper import Place, Push, Regress
+from experiments.cli.plan import Plan
+
+DESCRIPTION = """\
+A digital twin of a dual-arm assembly cell with a soft jig.
+Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
+"""
+Command = Plan | Assemble | Place | Push | Regress
+COMMANDS: dict[str, type[Command]] = {
+    "plan": Plan,
+    "assemble": Assemble,
+    "place": Place,
+    "push": Push,
+    "regress": Regress,
+}
+
+
+def parse(arguments: Sequence[str]) -> Command:
+    """Return the command that the arguments describe.
+
+    Raises:
+        BadUsage: Or `UnknownName` for a command that does not exist.
+        SystemExit: With code 0, after printing the help that was asked for.
+    """
+    command = arguments[0] if arguments else ""
+    if not command:
+        raise BadUsage(f"A command is missing. Known: {', '.join(COMMANDS)}. See soft-jig --help.")
+    if command not in COMMANDS and command not in ("-h", "--help"):
+        raise UnknownName("command", command, COMMANDS)
+    complaint = io.StringIO()
+    try:
+        with contextlib.redirect_stderr(complaint):
+            return tyro.extras.subcommand_cli_from_dict(
+                COMMANDS,
+                prog="soft-jig",
+                description=DESCRIPTION,
+                args=arguments,
+                config=(FlagCreatePairsOff,),
+            )
+    except SystemExit as stop:
+        if stop.code in (0, None):
+            raise
+        raise BadUsage(one_line(complaint.getvalue())) from None
+
+
+def one_line(complaint: str) -> str:
+    """Return tyro's complaint as one line: the fault, and the nearest right option.
+
+    Tyro prints sections with rules between: in a box with the title in its border, or, where the
+    terminal has no Unicode, without a box and with the title as the first section.
+    """
+    plain = re.sub(r"\x1b\[[0-9;]*m|[╭╰].*", "", complaint).replace("│", " ")
+    sections = [" ".join(text.split()) for text in re.split(r"^\s*[─-]{3,}\s*$", plain, flags=re.M)]
+    if "╭" not in complaint and len(sections) > 1:
+        sections.pop(0)
+    line = sections[0].removesuffix(" (required)").rstrip(".") + "."
+    for section in sections:
+        if nearest := re.match(r"Perhaps you meant: (\S+)", section):
+            line += f" Did you mean '{nearest[1]}'?"
+    return f"{line} See soft-jig --help."
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the command line and return the exit code."""
+    try:
+        return parse(sys.argv[1:] if arguments is None else arguments).run()
+    except CellError as error:
+        print(f"soft-jig: {error}", file=sys.stderr)
+        return 2

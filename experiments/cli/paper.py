@@ -1,0 +1,111 @@
+"""``soft-jig place``, ``soft-jig push``, ``soft-jig regress``, and their options."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Annotated, Literal
+
+from tyro.conf import OmitArgPrefixes, arg
+
+from experiments.cli.common import BadUsage, Common
+from experiments.reporting.output import output_folder
+
+
+@dataclass(frozen=True)
+class Place:
+    """The paper's placement experiment: six postures, disturbed; upright and at rest counts."""
+
+    case: Annotated[str | None, arg(metavar="motor/P2")] = None
+    """A posture, or a part for all of its postures. Default: all six."""
+
+    trials: int = 10
+    """Trials of each case."""
+
+    hand: Literal["rig", "robot"] = "rig"
+    """What carries the gripper: a position-controlled rig, or the arm, with planned motions."""
+
+    pressure: Annotated[float | None, arg(metavar="KPA")] = None
+    """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
+
+    bed: Literal["soft", "rigid"] = "soft"
+    """What the part is pressed on: the soft jig, or a flat rigid block in its place."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json`` and ``report.html``; return the exit code."""
+        return _run_experiment("place", self)
+
+
+@dataclass(frozen=True)
+class Push:
+    """The paper's push experiment: nine cases, 70 mm; the jig has to go along by 63 mm."""
+
+    case: Annotated[str | None, arg(metavar="motor/P2/a")] = None
+    """A case, or a part or posture for all of its cases. Default: all nine."""
+
+    trials: int = 5
+    """Trials of each case."""
+
+    hand: Literal["rig", "robot"] = "rig"
+    """What carries the gripper: a position-controlled rig, or the arm, with planned motions."""
+
+    pressure: Annotated[float | None, arg(metavar="KPA")] = None
+    """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
+
+    bed: Literal["soft", "rigid"] = "soft"
+    """What the part is pressed on: the soft jig, or a flat rigid block in its place."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json`` and ``report.html``; return the exit code."""
+        return _run_experiment("push", self)
+
+
+@dataclass(frozen=True)
+class Regress:
+    """Run experiments with seed 0 and compare outcomes and metrics with the stored ones."""
+
+    suite: Literal["quick", "full"] = "quick"
+    """quick: three cases, minutes; full: every case three times."""
+
+    update: bool = False
+    """Store what comes out, and print what changes."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``result.json``; return the exit code."""
+        config = self.common.load_config()
+        if self.common.seed != 0:
+            raise BadUsage("The stored metrics are those of --seed 0: leave it out.")
+        with output_folder(self.common.out) as out:
+            from experiments.paper.regress import run_regress
+
+            return run_regress(self.suite, self.update, config, out, self.common.quiet)
+
+
+def _run_experiment(command: str, options: Place | Push) -> int:
+    """Check everything that was asked for, then run it."""
+    from experiments.paper.case_results import Experiment
+    from experiments.paper.cases import check_hand
+    from experiments.paper.place_push import cases_of, check_trials, run_experiment, with_pressure
+
+    common = options.common
+    config = with_pressure(common.load_config(), options.pressure)
+    check_trials(options.trials)
+    check_hand(options.hand, options.bed)
+    cases_of(command, options.case)
+    with output_folder(common.out) as out:
+        experiment = Experiment(
+            command,
+            config,
+            options.hand,
+            options.bed,
+            options.trials,
+            common.seed,
+            out,
+            common.quiet,
+        )
+        return run_experiment(experiment, options.case)

@@ -1,0 +1,100 @@
+"""``soft-jig plan`` and its options."""
+
+from __future__ import annotations
+
+import contextlib
+import io
+import sys
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Annotated
+
+from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
+
+from experiments.cli.common import BadUsage, Common, split_order
+from experiments.reporting.output import output_folder
+
+if TYPE_CHECKING:
+    from experiments.plan.options import PlanOptions
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Decide, for each assembly step, which part the jig holds and in which posture."""
+
+    product: Annotated[Positional[str], arg(metavar="PRODUCT")]
+    """A name in models/products, a YAML, STEP or GLB file, or a folder of meshes, assembled."""
+
+    order: Annotated[str | None, arg(metavar="A,B,C")] = None
+    """Assembly order: parts or groups, separated by commas. Default: the product's, or the best."""
+
+    units: Annotated[str | None, arg(metavar="mm|cm|m|in")] = None
+    """Unit of a folder's meshes; needed unless all of them are .glb."""
+
+    density: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="[PART=]KG_M3")] = ()
+    """Density of a part, or of all that are not named; a YAML file states masses. Repeatable."""
+
+    group: bool = False
+    """Make one item of the order of parts that are identical."""
+
+    up: Annotated[str | None, arg(metavar="+x|-x|...|-z")] = None
+    """Axis that points up on the jig; write --up=-z. Default: the product's, or +z."""
+
+    tolerance_mm: Annotated[float | None, arg(metavar="MM")] = None
+    """Gap that still touches, overlap that does not block. Default: the product's, or derived."""
+
+    slanted: bool = False
+    """Also report ways out at an angle, from contact faces, and how far parts can move at all."""
+
+    no_cache: bool = False
+    """Compute the matrices anew, and do not keep them in the user's cache."""
+
+    explain: bool = False
+    """Also print the matrices, every candidate, and which pair blocks which direction, where."""
+
+    html: bool = True
+    """Write no plan.html, whose pictures take some seconds."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
+
+    def run(self) -> int:
+        """Write ``plan.json``, ``matrices.npz`` and ``plan.html``; return the exit code."""
+        config = self.common.load_config()
+        stdout = io.StringIO() if self.common.quiet else sys.stdout
+        with output_folder(self.common.out) as out, contextlib.redirect_stdout(stdout):
+            from experiments.plan.command import run_plan
+
+            return run_plan(
+                self.product,
+                split_order(self.order),
+                self.options(),
+                self.explain,
+                out,
+                config=config,
+                html=self.html,
+            )
+
+    def options(self) -> PlanOptions:
+        """Return how the product is read and planned."""
+        from experiments.plan.options import PlanOptions
+        from planning.fixing.cache import user_cache
+
+        if self.tolerance_mm is not None and not 0.0 < self.tolerance_mm < 10.0:
+            raise BadUsage(f"--tolerance-mm must be between 0 and 10, not {self.tolerance_mm:g}.")
+        return PlanOptions(
+            units=self.units,
+            densities=dict(map(split_density, self.density)),
+            group=self.group,
+            tolerance=None if self.tolerance_mm is None else 1e-3 * self.tolerance_mm,
+            cache=None if self.no_cache else user_cache(),
+            slanted=self.slanted,
+            up=self.up,
+        )
+
+
+def split_density(text: str) -> tuple[str, float]:
+    """Return the name, "" for all parts, and the value of a density written "[PART=]VALUE"."""
+    name, _, value = text.rpartition("=")
+    try:
+        return name.strip(), float(value)
+    except ValueError:
+        raise BadUsage(f"--density {text}: write it like 7850 or bolt=7850.") from None

@@ -1,0 +1,220 @@
+"""One part on a guided, driven carriage over a fixed soft jig: the rig of the element tests.
+
+The part is lowered to a depth, the bag is jammed, the carriage lets go, and a stiff spring
+drags the part sideways or up at constant speed. Force and displacement are recorded.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import (
+    AddMultibodyPlant,
+    ExternallyAppliedSpatialForce,
+    MultibodyPlantConfig,
+)
+from pydrake.multibody.tree import (
+    PdControllerGains,
+    PrismaticJoint,
+    SpatialInertia,
+)
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import DiagramBuilder
+
+from cell.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
+from experiments.jig.specimens import Prism, Specimen
+
+Array = NDArray[np.float64]
+
+# The spring between the drag's target and the cylinder [N/m], and its damper [N s/m]: stiff
+# against the bed's 10 to 100 N/mm, soft enough for an explicit force at 1 ms on 0.2 kg.
+DRAG_STIFFNESS = 2.0e4
+DRAG_DAMPING = 40.0
+
+
+@dataclass(frozen=True)
+class Drag:
+    """What a drag measured, per step: displacement [m], force [N], tilt [rad]."""
+
+    way: Array
+    force: Array
+    tilt: Array
+
+    @property
+    def holding_force(self) -> float:
+        """Largest force once the part has moved by 0.05 mm, median over 5 steps [N]."""
+        moving = self.force[int(np.argmax(self.way > 0.05e-3)) :]
+        smooth = np.median(np.lib.stride_tricks.sliding_window_view(moving, 5), axis=1)
+        return float(smooth.max())
+
+
+@dataclass
+class ElementRig:
+    """The diagram and its simulator; all poses in J, which coincides with W here.
+
+    Attributes:
+        params: Of the jig.
+        part: What is pressed into the bed.
+        press_force: Limit of the carriage's drive [N].
+        time_step: [s].
+        approximation: Drake's discrete contact approximation.
+    """
+
+    params: JigParameters = field(default_factory=JigParameters)
+    part: Specimen = field(default_factory=Prism)
+    press_force: float = 500.0
+    time_step: float = 1e-3
+    approximation: str = "lagged"
+
+    def __post_init__(self) -> None:
+        builder = DiagramBuilder()
+        config = MultibodyPlantConfig(
+            time_step=self.time_step,
+            contact_model="hydroelastic_with_fallback",
+            discrete_contact_approximation=self.approximation,
+        )
+        self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
+        base = self.plant.AddRigidBody("base", SpatialInertia.SolidBoxWithMass(1.5, 0.2, 0.2, 0.02))
+        self.plant.WeldFrames(self.plant.world_frame(), base.body_frame())
+        self.jig = SoftJig.add(self.plant, self.scene_graph, base, self.params)
+        self.body = self.part.add_to(self.plant)
+        self._X_CP = self.part.X_CP
+        self._add_carriage()
+        self.plant.Finalize()
+        self.simulator = Simulator(builder.Build())
+        self.root = self.simulator.get_mutable_context()
+        self.context = self.plant.GetMyMutableContextFromRoot(self.root)
+        self.jig.press_with(self.body, SurfaceSamples.of("part", self.part.mesh()))
+        self.jig.inflate(self.root)
+        self.jig.soften(self.root)
+        self._pull: list[ExternallyAppliedSpatialForce] = []
+        self._steps = 0
+        self._height = self.params.bag.cap_height + 0.5e-3
+        self._set_height(self._height, 0.0)
+        X_JP = self.X_JC(self._height) @ self._X_CP
+        self.plant.SetFreeBodyPose(self.context, self.body, X_JP)
+        self._slide.set_translation(self.context, self._height)
+        self.simulator.Initialize()
+
+    @staticmethod
+    def X_JC(height: float) -> RigidTransform:
+        """Return the carriage's pose."""
+        return RigidTransform([0.0, 0.0, height])
+
+    def _add_carriage(self) -> None:
+        instance = self.plant.AddModelInstance("carriage")
+        inertia = SpatialInertia.SolidBoxWithMass(5.0, 0.1, 0.1, 0.1)
+        carriage = self.plant.AddRigidBody("carriage", instance, inertia)
+        self._slide = self.plant.AddJoint(
+            PrismaticJoint(
+                "slide", self.plant.world_frame(), carriage.body_frame(), [0.0, 0.0, 1.0]
+            )
+        )
+        actuator = self.plant.AddJointActuator("slide", self._slide, self.press_force)
+        actuator.set_controller_gains(PdControllerGains(p=1e6, d=1e4))
+        self.plant.set_gravity_enabled(instance, False)
+        self._carriage = instance
+        self._grip = self.plant.AddWeldConstraint(
+            carriage, RigidTransform(), self.body, self._X_CP.inverse()
+        )
+
+    # Motion.
+
+    def _set_height(self, height: float, speed: float) -> None:
+        self._height = height
+        port = self.plant.get_desired_state_input_port(self._carriage)
+        port.FixValue(self.context, [height, speed])
+
+    def step(self, count: int = 1) -> None:
+        """Advance by some steps."""
+        port = self.plant.get_applied_spatial_force_input_port()
+        for _ in range(count):
+            self._steps += 1
+            port.FixValue(self.context, self.jig.applied_forces + self._pull)
+            self.simulator.AdvanceTo(self._steps * self.time_step)
+            self.jig.step(self.root, self.time_step)
+
+    def lower_to(self, depth: float, speed: float = 0.02) -> Array:
+        """Press the part to a depth below the apex [m]; return depth and force rows (n, 2)."""
+        goal, curve = self.params.bag.cap_height - depth, []
+        while self._height > goal:
+            self._set_height(max(self._height - speed * self.time_step, goal), -speed)
+            self.step()
+            curve.append((self.depth, self.bed_force))
+        self._set_height(goal, 0.0)
+        self.step(round(0.1 / self.time_step))
+        return np.array(curve)
+
+    @property
+    def bed_force(self) -> float:
+        """Upward force of the soft bed on the part [N]."""
+        forces = self.jig.applied_forces
+        return float(forces[0].F_Bq_W.translational()[2]) if forces else 0.0
+
+    def jam(self) -> None:
+        """Evacuate until the pressure is there, then hold the place instead of pressing on."""
+        self.jig.evacuate(self.root)
+        while self.jig.state is not JigState.JAMMED:
+            self.step()
+        self._set_height(self.params.bag.cap_height - self.depth, 0.0)
+        self.step(round(0.5 / self.time_step))
+
+    def let_go(self, wait: float = 0.5) -> None:
+        """Open the grip and wait [s]."""
+        self.plant.SetConstraintActiveStatus(self.context, self._grip, False)
+        self._set_height(0.3, 0.0)
+        self.step(round(wait / self.time_step))
+
+    def drag(self, p_PQ: Array, direction: Array, way: float = 0.006, speed: float = 0.01) -> Drag:
+        """Drag point Q of the part along a direction of J [m]; the target moves at `speed`."""
+        p_JQ0, R_JP0 = self.X_JP @ p_PQ, self.X_JP.rotation()
+        rows = []
+        while (target := speed * self.time_step * len(rows)) < way:
+            moved = float(direction @ (self.X_JP @ p_PQ - p_JQ0))
+            force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (
+                speed - self._rate(p_PQ, direction)
+            )
+            self._pull = [self._force_at(p_PQ, max(force, 0.0) * direction)]
+            self.step()
+            turn = (R_JP0.inverse() @ self.X_JP.rotation()).ToAngleAxis().angle()
+            rows.append((moved, max(force, 0.0), turn))
+        self._pull = []
+        return Drag(*np.array(rows).T)
+
+    def _rate(self, p_PQ: Array, direction: Array) -> float:
+        V_WP = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.body)
+        arm = self.X_JP.rotation() @ p_PQ
+        return float(direction @ V_WP.Shift(arm).translational())
+
+    def _force_at(self, p_PQ: Array, force: Array) -> ExternallyAppliedSpatialForce:
+        applied = ExternallyAppliedSpatialForce()
+        applied.body_index = self.body.index()
+        applied.p_BoBq_B = p_PQ
+        applied.F_Bq_W = SpatialForce(np.zeros(3), force)
+        return applied
+
+    @property
+    def speed(self) -> float:
+        """Speed of the part's origin [m/s]."""
+        V_WP = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.body)
+        return float(np.linalg.norm(V_WP.translational()))
+
+    @property
+    def X_JP(self) -> RigidTransform:
+        """Pose of the part."""
+        return self.plant.EvalBodyPoseInWorld(self.context, self.body)
+
+    @property
+    def depth(self) -> float:
+        """How far the part's lowest point is below the apex of the inflated bag [m]."""
+        low = (self.X_JP @ self._X_CP.inverse()).translation()[2]
+        return self.params.bag.cap_height - float(low)
+
+
+def with_vacuum(params: JigParameters, pressure: float) -> JigParameters:
+    """Return the parameters with another final vacuum [Pa]."""
+    return replace(params, vacuum=replace(params.vacuum, pressure=pressure))

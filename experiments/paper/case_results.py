@@ -1,0 +1,243 @@
+"""``result.json`` and ``report.html`` of the place and push experiments."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from rich.table import Table
+from scipy.stats import t as student
+from scipy.stats import ttest_ind
+
+from cell.config import CellConfig
+from experiments.paper.case_plots import PAPER_MEANS, plot_forces, plot_quantity, plot_rates
+from experiments.paper.cases import CaseResult
+from experiments.reporting.output import write_json
+from experiments.reporting.provenance import finite, versions
+from experiments.reporting.report import Picture, write_report
+
+ASSUMED = (
+    "The paper's figures of postures and push directions are not public as text: the pictures and "
+    "the table show how its words are read here. Postures, directions, push height and suction "
+    "were chosen with its outcome table known; no number differs between cases or parts."
+)
+HAND = (
+    "The hand is a closed parallel gripper with fingers and palm of assumed size, pushed so that "
+    "both fingertips' narrow sides lead; its palm overhangs their noses by 36 mm."
+)
+FORMULA = (
+    "The displacement is |dp_c|, how far the mean of the four screws moved. The formula printed in "
+    "the paper compares the screws with their own mean and is 0 for any pure translation, so it "
+    "cannot have given the paper's 78.2 mm; its value stands beside as printed_formula_m."
+)
+FORCES = (
+    "The force plate's readings are less those at the start, with the jig at rest on it, and "
+    "averaged over 10 ms. While the hand travels from placing to pushing, part and jig sleep: the "
+    "last reading then stands for theirs."
+)
+# Of the printed table: quantity, heading, scale.
+PUSH_COLUMNS = (
+    ("displacement_m", "moved [mm]", 1e3),
+    ("push_shear_peak_N", "shear [N]", 1.0),
+    ("force_peaks", "peaks", 1.0),
+)
+PLACE_COLUMNS = (
+    ("depth_m", "depth [mm]", 1e3),
+    ("tilt_rad", "tilt [deg]", float(np.rad2deg(1.0))),
+)
+
+
+@dataclass(frozen=True)
+class Experiment:
+    """What was asked for.
+
+    Attributes:
+        command: "place" or "push".
+        config: Every number.
+        hand: "rig" or "robot".
+        bed: "soft" or "rigid".
+        trials: Of each case.
+        seed: Of the disturbances.
+        out: Existing folder for the results.
+        quiet: Whether to print nothing.
+    """
+
+    command: str
+    config: CellConfig
+    hand: str
+    bed: str
+    trials: int
+    seed: int
+    out: Path
+    quiet: bool = False
+
+
+def verdict(results: Sequence[CaseResult]) -> str:
+    """Return "success" if every case came out as expected, else "failure"."""
+    return "success" if all(result.agrees for result in results) else "failure"
+
+
+def write_case_results(
+    experiment: Experiment, results: Sequence[CaseResult], pictures: Sequence[Picture], notes
+) -> None:
+    """Write result and report."""
+    for name in ("result.json", "report.html"):
+        (experiment.out / name).unlink(missing_ok=True)
+    result = summary(experiment, results)
+    push = experiment.command == "push"
+    said = [ASSUMED, *([HAND, FORMULA] if push else []), FORCES, *notes, *_failures(results)]
+    write_report(
+        experiment.out / "report.html",
+        title=f"Experiment: {experiment.command}",
+        plan={},
+        result=result,
+        pictures=pictures,
+        plots=_plots(results, push),
+        notes=said,
+    )
+    # Last: whoever finds it finds the rest, too.
+    write_json(experiment.out / "result.json", result)
+
+
+def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return what ``result.json`` holds."""
+    trials = [trial.trial for result in results for trial in result.trials]
+    simulated = sum(trial.sim_seconds for trial in trials)
+    spent = sum(trial.cpu_seconds for trial in trials)
+    return {
+        "command": experiment.command,
+        "product": "motor_unit",
+        "order": [],
+        "seed": experiment.seed,
+        "hand": experiment.hand,
+        "bed": experiment.bed,
+        "verdict": verdict(results),
+        "cases": [_case(result) for result in results],
+        "by_outcome": _compared(results),
+        "real_time_factor": simulated / max(spent, 1e-9),
+        "cpu_seconds_per_trial": spent / max(len(trials), 1),
+        "config": finite(experiment.config.to_dict()),
+        "versions": versions(),
+    }
+
+
+def _case(result: CaseResult) -> dict[str, Any]:
+    case = result.case
+    direction = {} if case.push is None else {"direction": case.push.direction}
+    failures = [
+        {"trial": k, "phase": trial.failure[0], "evidence": trial.failure[1]}
+        for k, trial in enumerate(result.trials)
+        if trial.failure is not None
+    ]
+    return {
+        "part": case.posture.part,
+        "posture": case.posture.name,
+        **direction,
+        "meaning": _meaning(result),
+        "trials": len(result.trials),
+        "successes": result.successes,
+        "expected": case.expected,
+        "verdict": "success" if result.agrees else "failure",
+        "success_rate_interval": result.interval,
+        "measured": result.means(),
+        "each": [trial.measured | {"success": int(trial.success)} for trial in result.trials],
+        "failures": failures,
+    }
+
+
+def _compared(results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return what the paper compares between successes and failures."""
+    return {
+        "displacement_m": by_outcome(results, "displacement_m", PAPER_MEANS),
+        "push_shear_peak_N": by_outcome(results, "push_shear_peak_N"),
+    }
+
+
+def by_outcome(
+    results: Sequence[CaseResult], quantity: str, paper: Mapping[str, float] | None = None
+) -> dict[str, Any]:
+    """Return a quantity's means over successful and failed trials, 95 % intervals, Welch's test.
+
+    Args:
+        results: Of all cases together; the trials of a case are taken as independent.
+        quantity: As it was measured.
+        paper: Its mean by outcome in the paper, if that is known.
+    """
+    groups: dict[str, list[float]] = {"success": [], "failure": []}
+    for trial in (trial for result in results for trial in result.trials):
+        if quantity in trial.measured:
+            groups["success" if trial.success else "failure"].append(trial.measured[quantity])
+    found: dict[str, Any] = {name: _mean(values) for name, values in groups.items() if values}
+    for name in found:
+        found[name] |= {"paper_mean": paper[name]} if paper else {}
+    if all(len(values) > 1 and np.ptp(values) > 0 for values in groups.values()):
+        test = ttest_ind(groups["success"], groups["failure"], equal_var=False)
+        found["welch_p"] = float(np.asarray(test)[1])
+    return found
+
+
+def _mean(values: Sequence[float]) -> dict[str, Any]:
+    """Return number, mean and, for more than one, Student's 95 % interval."""
+    mean = float(np.mean(values))
+    found: dict[str, Any] = {"trials": len(values), "mean": mean}
+    if len(values) > 1:
+        half = student.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values) ** 0.5
+        found["interval"] = [mean - float(half), mean + float(half)]
+    return found
+
+
+def _failures(results: Sequence[CaseResult]) -> list[str]:
+    return [
+        f"{result.case.label}, trial {k}: stopped in '{trial.failure[0]}': {trial.failure[1]}"
+        for result in results
+        for k, trial in enumerate(result.trials)
+        if trial.failure is not None
+    ]
+
+
+def _plots(results: Sequence[CaseResult], push: bool) -> list[Picture]:
+    plots = [("Success rate, with Wilson's 95 % interval", plot_rates(results))]
+    if push:
+        shear = plot_quantity(results, "push_shear_peak_N", "largest shear force [N]", 1.0)
+        moved = plot_quantity(results, "displacement_m", "displacement of the jig [mm]", 1e3)
+        plots += [("Largest shear force while pushing", shear), ("Displacement", moved)]
+    else:
+        depth = plot_quantity(results, "depth_m", "depth below the apex [mm]", 1e3)
+        plots.append(("Depth of the lowest point", depth))
+    return plots + [
+        (f"{result.case.label}: {_meaning(result)}", plot_forces(result)) for result in results
+    ]
+
+
+def _meaning(result: CaseResult) -> str:
+    case = result.case
+    return case.posture.meaning + ("" if case.push is None else f", pushed {case.push.meaning}")
+
+
+def case_table(command: str, results: Sequence[CaseResult]) -> Table:
+    """Return the table a person reads: outcomes beside the paper's."""
+    push = command == "push"
+    table = Table(title=f"Experiment: {command}", title_justify="left")
+    columns = PUSH_COLUMNS if push else PLACE_COLUMNS
+    quantities, headings, scales = zip(*columns, strict=True)
+    for heading in ("case", "hits", "paper", "agrees", *headings, "CPU [s]"):
+        justify = "left" if heading in ("case", "paper") else "right"
+        table.add_column(heading, justify=justify, no_wrap=True)
+    for result in results:
+        values = [scale * result.values(q) for q, scale in zip(quantities, scales, strict=True)]
+        shown = [_spread(v) for v in values]
+        cpu = np.mean([trial.trial.cpu_seconds for trial in result.trials])
+        counts = f"{result.successes}/{len(result.trials)}"
+        agrees = "yes" if result.agrees else "no"
+        table.add_row(result.case.label, counts, result.case.expected, agrees, *shown, f"{cpu:.0f}")
+    return table
+
+
+def _spread(values: np.ndarray) -> str:
+    """Return mean and standard deviation of some values, as far as there are any."""
+    if len(values) < 2:
+        return "".join(f"{value:.1f}" for value in values)
+    return f"{values.mean():.1f} ± {values.std(ddof=1):.1f}"

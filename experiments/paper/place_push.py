@@ -1,0 +1,116 @@
+"""``soft-jig place`` and ``soft-jig push``: the paper's experiments, with either hand."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from pydrake.math import RigidTransform
+from rich.console import Console
+from rich.progress import Progress
+
+from cell.config import CellConfig
+from cell.errors import CellError
+from cell.loading import load_product
+from cell.stage import Observer
+from experiments.paper.case_results import Experiment, case_table, verdict, write_case_results
+from experiments.paper.cases import Case, CaseResult, run_cases
+from experiments.paper.postures import POSTURES, PUSHES, chosen
+from experiments.reporting.render import View, rendering_problem, take_picture
+from experiments.reporting.report import Picture
+
+ATMOSPHERE = 101.325e3  # [Pa] No pump makes more vacuum.
+PICTURED = {"place": ("placed",), "push": ("before", "after", "end")}
+
+
+def cases_of(command: str, label: str | None) -> list[Case]:
+    """Return the cases of an experiment that a label names; None: all.
+
+    Raises:
+        UnknownName: Listing the known ones.
+    """
+    if command == "place":
+        return [Case(posture) for posture in chosen("posture to place", POSTURES, label)]
+    return [Case(push.posture, push) for push in chosen("case to push", PUSHES, label)]
+
+
+def with_pressure(config: CellConfig, pressure_kpa: float | None) -> CellConfig:
+    """Return the configuration with another vacuum, or refuse what no pump can do."""
+    vacuum = config.jig.vacuum
+    if pressure_kpa is not None:
+        vacuum = replace(vacuum, pressure=1e3 * pressure_kpa)
+    if not 0 <= vacuum.pressure <= ATMOSPHERE:
+        raise CellError(
+            f"A vacuum of {vacuum.pressure / 1e3:g} kPa is impossible: "
+            f"it is between 0 (the bag stays soft) and {ATMOSPHERE / 1e3:g} kPa."
+        )
+    return replace(config, jig=replace(config.jig, vacuum=vacuum))
+
+
+def check_trials(trials: int) -> None:
+    """Raise `CellError` unless there is something to do."""
+    if trials < 1:
+        raise CellError(f"--trials must be at least 1, not {trials}.")
+
+
+def run_experiment(experiment: Experiment, label: str | None) -> int:
+    """Run the cases that a label names; write result and report.
+
+    Returns:
+        0 if every case came out as expected, else 1.
+    """
+    cases = cases_of(experiment.command, label)
+    console = Console(quiet=experiment.quiet, highlight=False)
+    album = _Album(experiment)
+    results: dict[str, CaseResult] = {}
+    hidden = console.quiet or not console.is_terminal
+    with Progress(console=console, transient=True, disable=hidden) as bar:
+        task = bar.add_task("", total=len(cases) * experiment.trials)
+        done = run_cases(
+            cases,
+            product=load_product("motor_unit"),
+            config=experiment.config,
+            bed=experiment.bed,
+            trials=experiment.trials,
+            seed=experiment.seed,
+            hand=experiment.hand,
+            watch=album.take,
+        )
+        for result, trial in done:
+            results[result.case.label] = result
+            bar.update(task, advance=1, description=result.case.label)
+            word = "success" if trial.success else "failure"
+            console.print(f"{result.case.label} {len(result.trials)}: {word}", markup=False)
+    found = list(results.values())
+    write_case_results(experiment, found, album.pictures, album.notes)
+    console.print(case_table(experiment.command, found))
+    return 0 if verdict(found) == "success" else 1
+
+
+class _Album:
+    """Pictures of the first trial of each case, where the machine can render."""
+
+    def __init__(self, experiment: Experiment) -> None:
+        self.wanted = PICTURED[experiment.command]
+        self.pictures: list[Picture] = []
+        problem = rendering_problem()
+        self.notes = [] if problem is None else [f"No pictures: {problem}."]
+
+    def take(self, case: Case, event: str, seen: Observer) -> None:
+        """Take the picture of an event."""
+        ended_early = event == "end" and not self._is_last(case, "after")
+        if self.notes or event not in self.wanted or (event == "end" and not ended_early):
+            return
+        view = view_of(seen.stage.config.workcell.X_WJ)
+        caption = f"{case.label}: {event}"
+        scene = take_picture(seen.stage.scene_graph, seen.root, view)
+        self.pictures.append((caption, scene))
+
+    def _is_last(self, case: Case, event: str) -> bool:
+        return bool(self.pictures) and self.pictures[-1][0] == f"{case.label}: {event}"
+
+
+def view_of(X_WJ: RigidTransform) -> View:
+    """Return a camera that sees the jig and 70 mm to each side."""
+    p_WJ = X_WJ.translation()
+    target = tuple(p_WJ + [0.0, 0.0, 0.05])
+    return View(p_WC=tuple(p_WJ + [0.35, -0.45, 0.28]), p_WTarget=target, width=720, height=480)

@@ -1,0 +1,57 @@
+"""Where the hand starts its push: one rule for all cases and both hands."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cell.stage import Stage
+from cell.stroke import Stroke
+from experiments.paper.postures import AXES, MM, Push
+from experiments.paper.reach import Fingers
+from planning.operations.push import PushLine
+
+
+def push_line(stage: Stage, push: Push, X_WJ: RigidTransform, X_WP: RigidTransform) -> PushLine:
+    """Return the straight line of the closed hand's frame T that a push takes.
+
+    The one rule for all cases: the fingers' lowest point at `height_fraction` of the exposed height
+    of the pushed face where the hand meets it, and `bed_clearance` above the bed at least; the hand
+    points down with its fingers' narrow sides ahead and starts `start_gap` before it touches.
+
+    Args:
+        stage: Part, jig and hand.
+        push: Which push.
+        X_WJ: Where the jig is, or is expected to be.
+        X_WP: The same of the part.
+    """
+    numbers = stage.config.push
+    foot, top = (X_WP @ (np.array(point) * MM) for point in (push.foot, push.top))
+    direction = X_WP.rotation() @ AXES[push.along]
+    direction = np.array([direction[0], direction[1], 0.0]) / np.hypot(*direction[:2])
+    bed = bed_height(stage, X_WJ, foot[:2])
+    low = max(foot[2], bed)
+    height = max(low + numbers.height_fraction * (top[2] - low), bed + numbers.bed_clearance)
+    fingers = Fingers.of_hand(stage)
+    travel = fingers.travel(X_WP @ stage.samples.points.T, top[:2], height, direction)
+    p_WT = np.array([*top[:2], height + fingers.below_tip])
+    p_WT += (travel - numbers.start_gap) * direction
+    stroke = Stroke(numbers.stroke, numbers.speed, numbers.acceleration)
+    return PushLine(RigidTransform(leading(direction), p_WT), direction, stroke)
+
+
+def leading(direction: np.ndarray) -> RotationMatrix:
+    """Return R_WT of a hand that points down and has -y of T along a level direction (3,)."""
+    turn = float(np.arctan2(-direction[0], direction[1]))
+    return RotationMatrix.MakeZRotation(turn) @ RotationMatrix.MakeXRotation(np.pi)
+
+
+def bed_height(stage: Stage, X_WJ: RigidTransform, p_WQ: np.ndarray, radius: float = 5e-3) -> float:
+    """Return the highest the bed stands in W around a point (2,) [m]."""
+    if stage.soft_jig is None:
+        return float(X_WJ.translation()[2] + stage.config.jig.bag.cap_height)
+    p_JQ = X_WJ.inverse() @ np.array([*p_WQ, X_WJ.translation()[2]])
+    ring = np.linspace(0, 2 * np.pi, 12, endpoint=False)
+    around = p_JQ[:2] + radius * np.column_stack([np.cos(ring), np.sin(ring)])
+    heights = stage.soft_jig.bed.height_at(np.vstack([p_JQ[:2], around]))
+    return float(X_WJ.translation()[2] + heights.max())

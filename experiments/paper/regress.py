@@ -1,0 +1,217 @@
+"""``soft-jig regress``: the experiments' outcomes and metrics against stored ones.
+
+Each metric has a tolerance with a reason. What is compared is the mean over the trials of a case;
+with one machine and one seed every run is bit-identical, so the tolerances are for a change of
+machine or library, and for changes of the model that are meant to change nothing.
+"""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+from rich.table import Table
+
+from cell.config import CellConfig
+from cell.errors import CellError
+from cell.loading import load_product
+from cell.paths import MODELS
+from experiments.paper.cases import Case, CaseResult, run_cases
+from experiments.paper.place_push import cases_of
+from experiments.reporting.output import write_json
+from experiments.reporting.provenance import finite, versions
+
+BASELINE = MODELS / "regression"
+SEED = 0
+
+
+@dataclass(frozen=True)
+class Tolerance:
+    """How far a metric may drift.
+
+    Attributes:
+        metric: Its name, with SI units.
+        absolute: In the metric's unit.
+        relative: Of the stored value; the larger of the two counts.
+        reason: Why this much.
+    """
+
+    metric: str
+    absolute: float
+    relative: float
+    reason: str
+
+    def holds(self, stored: float, now: float) -> bool:
+        """Return whether the drift is inside."""
+        return abs(now - stored) <= max(self.absolute, self.relative * abs(stored))
+
+
+TOLERANCES = (
+    Tolerance("success_rate", 0.0, 0.0, "an outcome that flips is a change of behaviour"),
+    Tolerance("depth_m", 5e-4, 0.05, "the press stops within a step of its force limit"),
+    Tolerance("tilt_rad", 0.01, 0.0, "half a degree is what the grasp's scatter makes"),
+    Tolerance("release_shift_m", 1e-4, 0.0, "a third of the allowed kick of 0.3 mm"),
+    Tolerance("place_normal_peak_N", 0.5, 0.05, "one step of the press, 20 N in 10 mm"),
+    Tolerance("displacement_m", 3e-3, 0.05, "half of what separates 63 mm from the 70 mm pushed"),
+    Tolerance("push_shear_peak_N", 1.0, 0.15, "a peak of stick-slip, averaged over 10 ms"),
+    Tolerance("part_rotation_rad", 0.05, 0.15, "once it topples, where it ends is chance"),
+)
+
+
+@dataclass(frozen=True)
+class Suite:
+    """What is run.
+
+    Attributes:
+        name: "quick" or "full".
+        cases: Experiment and label of each case; None is all of them.
+        trials: Of each case.
+    """
+
+    name: str
+    cases: tuple[tuple[str, str | None], ...]
+    trials: int
+
+
+SUITES = {
+    suite.name: suite
+    for suite in (
+        Suite("quick", (("place", "motor/P2"), ("push", "motor/P2/a"), ("push", "plate/P2/c")), 1),
+        Suite("full", (("place", None), ("push", None)), 3),
+    )
+}
+
+
+@dataclass(frozen=True)
+class Drift:
+    """One metric of one case, stored and now; None where it is missing."""
+
+    case: str
+    metric: str
+    stored: float | None
+    now: float | None
+    tolerance: Tolerance
+
+    @property
+    def ok(self) -> bool:
+        """Whether it is in both and inside of its tolerance."""
+        known = self.stored is not None and self.now is not None
+        return known and self.tolerance.holds(self.stored or 0.0, self.now or 0.0)
+
+
+Metrics = dict[str, dict[str, float]]  # Case -> metric -> value.
+
+
+def metrics_of(results: Mapping[str, CaseResult]) -> Metrics:
+    """Return what is stored of each case."""
+    found = {}
+    for name, result in results.items():
+        means = result.means() | {"success_rate": result.successes / len(result.trials)}
+        names = [tolerance.metric for tolerance in TOLERANCES]
+        found[name] = {metric: means[metric] for metric in names if metric in means}
+    return found
+
+
+def drifts(stored: Metrics, now: Metrics) -> list[Drift]:
+    """Compare, in the order of the present run; cases only stored come last."""
+    rows = []
+    for case in dict.fromkeys([*now, *stored]):
+        before, after = stored.get(case, {}), now.get(case, {})
+        for tolerance in TOLERANCES:
+            metric = tolerance.metric
+            if metric in before or metric in after:
+                rows.append(Drift(case, metric, before.get(metric), after.get(metric), tolerance))
+    return rows
+
+
+def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, CaseResult]:
+    """Run every case of a suite; return the results by "experiment case"."""
+    results: dict[str, CaseResult] = {}
+    for command, label in suite.cases:
+        cases: list[Case] = cases_of(command, label)
+        done = run_cases(
+            cases,
+            product=load_product("motor_unit"),
+            config=config,
+            bed="soft",
+            trials=suite.trials,
+            seed=SEED,
+        )
+        for result, trial in done:
+            results[f"{command} {result.case.label}"] = result
+            cpu = trial.trial.cpu_seconds
+            console.print(f"{command} {result.case.label}: {cpu:.1f} s of CPU", markup=False)
+    return results
+
+
+def read_baseline(path: Path) -> Metrics:
+    """Read stored metrics.
+
+    Raises:
+        CellError: There are none, or they cannot be read.
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))["cases"]
+    except FileNotFoundError:
+        raise CellError(f"No stored metrics '{path}': make them with --update.") from None
+    except (OSError, ValueError, KeyError) as error:
+        raise CellError(f"Cannot read the stored metrics '{path}': {error}.") from error
+
+
+def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, quiet: bool) -> int:
+    """Run a suite and compare it with what is stored, or store it anew.
+
+    Returns:
+        0 if nothing drifted out of its tolerance or the stored metrics were updated, else 1.
+    """
+    console = Console(quiet=quiet, highlight=False)
+    suite, path = SUITES[suite_name], BASELINE / f"{suite_name}.json"
+    stored = {} if update and not path.exists() else read_baseline(path)
+    now = metrics_of(run_suite(suite, config, console))
+    rows = drifts(stored, now)
+    shown = [row for row in rows if row.stored != row.now] if update else rows
+    console.print(drift_table(shown, *(("Changes", "changed") if update else ("Drift", "drift"))))
+    good = all(row.ok for row in rows)
+    if update:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_json(path, {"suite": suite_name, "seed": SEED, "cases": now})
+    write_json(out / "result.json", _result(suite_name, update or good, rows, config))
+    return 0 if update or good else 1
+
+
+def _result(suite: str, success: bool, rows: Sequence[Drift], config: CellConfig) -> dict[str, Any]:
+    return {
+        "command": "regress",
+        "suite": suite,
+        "seed": SEED,
+        "verdict": "success" if success else "failure",
+        "metrics": [
+            {
+                "case": row.case,
+                "metric": row.metric,
+                "stored": row.stored,
+                "now": row.now,
+                "ok": row.ok,
+                "reason": row.tolerance.reason,
+            }
+            for row in rows
+        ],
+        "config": finite(config.to_dict()),
+        "versions": versions(),
+    }
+
+
+def drift_table(rows: Sequence[Drift], title: str, word: str) -> Table:
+    """Return one line per metric; those outside of their tolerance are marked with a word."""
+    table = Table(title=title, title_justify="left")
+    for heading in ("case", "metric", "stored", "now", "allowed", ""):
+        table.add_column(heading, justify="left" if heading in ("case", "metric") else "right")
+    for row in rows:
+        allowed = max(row.tolerance.absolute, row.tolerance.relative * abs(row.stored or 0.0))
+        values = ["-" if value is None else f"{value:.4g}" for value in (row.stored, row.now)]
+        table.add_row(row.case, row.metric, *values, f"{allowed:.2g}", "" if row.ok else word)
+    return table

@@ -1,0 +1,149 @@
+"""The hand on the rig's carriage, in a trial: the part waits in it, over the jig."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cell.config import CellConfig
+from cell.phase import PhaseFailed
+from cell.product import Grasp, Product
+from cell.rig import HandPose, Rig, build_push_rig
+from cell.rig_simulation import RigSimulation
+from cell.stage import Observer
+from experiments.paper.postures import Posture
+from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
+from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
+from planning.operations.pick_place import DEEPEST, JAM_TIME, PRESS_SPEED
+from planning.operations.push import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
+
+HOLD_TIME = 0.2  # The hand stays this long after the bag has frozen [s] [A].
+RETREAT = 0.08
+TRAVEL_SPEED = 0.3  # Of the hand in the free [m/s] [A].
+
+
+def tip_pose(rig: Rig, X_WP: RigidTransform, grasp: Grasp) -> HandPose:
+    """Return where the hand is when its jaw is at a grasp of the part."""
+    hand = rig.gripper.instance
+    X_TipMount = rig.plant.GetFrameByName("tip", hand).GetFixedPoseInBodyFrame().inverse()
+    X_TipJaw = X_TipMount @ rig.plant.GetFrameByName(grasp.jaw, hand).GetFixedPoseInBodyFrame()
+    return HandPose.of(X_WP @ grasp.X_PJaw @ X_TipJaw.inverse())
+
+
+@dataclass(frozen=True)
+class RigBench:
+    """A built rig, for the trials of one posture.
+
+    Attributes:
+        rig: Built for the posture's part.
+        posture: How the part is placed.
+    """
+
+    rig: Rig
+    posture: Posture
+
+    @staticmethod
+    def build(config: CellConfig, product: Product, posture: Posture, bed: str) -> RigBench:
+        """Build it; ``bed`` is "soft" or "rigid"."""
+        return RigBench(build_push_rig(config, product, posture.part, bed), posture)
+
+    def begin(self, disturbance: Disturbance) -> RigHand:
+        """Put a stand with the part over the jig, and the open hand around it."""
+        config, X_WJ = self.rig.config, self.rig.config.workcell.X_WJ
+        height = config.jig.bag.cap_height + HOVER
+        X_WP = planned_pose(self.rig.part.part, self.posture, X_WJ, height)
+        simulation = RigSimulation(
+            self.rig,
+            disturbance.displaced(X_WJ),
+            X_WP @ disturbance.X_PDrawn,
+            tip_pose(self.rig, X_WP, self.posture.grasp),
+        )
+        return RigHand(simulation, self.posture.grasp, X_WJ.InvertAndCompose(X_WP))
+
+
+@dataclass(frozen=True)
+class RigHand:
+    """The rig's hand in one trial: see `experiments.paper.trial.Hand`.
+
+    Attributes:
+        simulation: Of the rig.
+        grasp: How it holds the part.
+        planned: X_JP as aimed at.
+    """
+
+    simulation: RigSimulation
+    grasp: Grasp
+    planned: RigidTransform
+
+    @property
+    def observer(self) -> Observer:
+        """Looks at part and jig, and records."""
+        return self.simulation.observer
+
+    def press(self) -> None:
+        """Grip, press, freeze: as the robot does it."""
+        self._grip()
+        simulation, force = self.simulation, self.simulation.rig.config.placement.press_force
+        simulation.begin("press")
+        simulation.press_with_part()
+        if not simulation.lower(PRESS_SPEED, HOVER + DEEPEST, force):
+            raise PhaseFailed("press", f"no resistance within {DEEPEST * 1e3:g} mm")
+        simulation.begin("jam")
+        simulation.evacuate()
+        for _ in range(round(JAM_TIME / simulation.time_step)):
+            simulation.step()
+            if simulation.frozen:
+                break
+        simulation.wait(HOLD_TIME)
+        if not simulation.frozen:
+            raise PhaseFailed("jam", f"the bag is still soft after {JAM_TIME:g} s")
+
+    def _grip(self) -> None:
+        """Take the part from its stand."""
+        simulation = self.simulation
+        simulation.begin("grip")
+        simulation.wait(READY_TIME)
+        simulation.observer.tare()
+        simulation.observer.recording = True
+        simulation.jaws(tip_opening(self.grasp), self.grasp.force)
+        simulation.wait(GRIP_TIME)
+        simulation.rig.let_part_go(simulation.root)
+        simulation.wait(0.1)
+
+    def let_go(self) -> None:
+        """Open the jaws and back off along the approach direction."""
+        simulation = self.simulation
+        simulation.begin("release")
+        simulation.jaws(tip_opening(self.grasp) + CLEARANCE)
+        simulation.wait(RELEASE_TIME)
+        start = simulation.pose
+        for distance, speed in ((CLEAR, 0.08), (RETREAT, TRAVEL_SPEED)):
+            back = start.p_WT - distance * start.R_WT.matrix()[:, 2]
+            simulation.move(replace(start, p_WT=back), speed)
+
+    def approach(self, line: PushLine) -> None:
+        """Come from above and behind."""
+        simulation = self.simulation
+        simulation.begin("approach")
+        simulation.jaws(0.0)
+        simulation.sleep()
+        start, up = HandPose.of(line.X_WT), np.array([0.0, 0.0, 1.0])
+        high = start.p_WT + ABOVE * up - BEHIND_ABOVE * line.direction
+        simulation.move(replace(start, p_WT=high), 2 * TRAVEL_SPEED)
+        back = start.p_WT - BEHIND * line.direction
+        simulation.move(replace(start, p_WT=back), TRAVEL_SPEED)
+        simulation.move(start, TRAVEL_SPEED / 3)
+        simulation.wake()
+
+    def push(self, line: PushLine) -> None:
+        """Push along the line."""
+        self.simulation.begin("push")
+        goal = HandPose.of(line.at(line.stroke.way))
+        self.simulation.push(goal, line.stroke.speed, line.stroke.acceleration)
+
+    def wait(self, phase: str, seconds: float) -> None:
+        """Hold still."""
+        self.simulation.begin(phase)
+        self.simulation.wait(seconds)

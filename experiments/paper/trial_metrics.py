@@ -1,0 +1,114 @@
+"""What one trial of the place and push experiments is judged by."""
+
+from __future__ import annotations
+
+import numpy as np
+from pydrake.math import RigidTransform
+from scipy.ndimage import uniform_filter1d
+
+from experiments.metrics.common import Measured, angle_between
+from experiments.paper.camera import seen_displacement
+from experiments.paper.trial import HOVER, Trial
+
+SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
+UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], read as this tilt [A].
+AT_REST = 1e-3  # [m/s] [A] a part that creeps faster has not come to rest.
+SMOOTHING = 0.01  # [s] A force plate's amplifier smooths over about this long [A].
+VISIBLE = 0.2  # A peak below this share of the placing peak does not stand out in a plot [A].
+
+
+def smoothed(values: np.ndarray, time: np.ndarray) -> np.ndarray:
+    """Return (n,) values averaged over `SMOOTHING`."""
+    period = float(np.median(np.diff(time))) if len(time) > 1 else SMOOTHING
+    return uniform_filter1d(values, max(1, round(SMOOTHING / period)))
+
+
+def plate_forces(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return time [s], F_n = |f_z| and F_s = hypot(f_x, f_y) [N], less the jig's own weight."""
+    time, force = trial.log["time"], trial.log["force_plate"][:, 3:]
+    normal, shear = np.abs(force[:, 2]), np.hypot(force[:, 0], force[:, 1])
+    return time, smoothed(normal, time), smoothed(shear, time)
+
+
+def start_of(trial: Trial, phase: str) -> float | None:
+    """Return when a phase began [s]; None if it did not."""
+    starts = dict(zip(trial.log["phase_name"], trial.log["phase_start"], strict=True))
+    return float(starts[phase]) if phase in starts else None
+
+
+def tilt_between(X_JA: RigidTransform, X_JB: RigidTransform) -> float:
+    """Return the angle between what points up in A and in B [rad]."""
+    up_A, up_B = (X.rotation().matrix()[2] for X in (X_JA, X_JB))
+    return float(np.arccos(np.clip(up_A @ up_B, -1.0, 1.0)))
+
+
+def measure_place(trial: Trial) -> Measured:
+    """Return how the part stands after it was let go, and what the press took."""
+    measured: Measured = {}
+    if trial.placed is not None:
+        drop = trial.planned.translation() - trial.placed.translation()
+        measured["depth_m"] = float(drop[2]) - HOVER
+        measured["offset_m"] = float(np.hypot(*drop[:2]))
+        measured["tilt_rad"] = tilt_between(trial.planned, trial.placed)
+        measured["speed_m_per_s"] = trial.speed
+    if trial.held is not None and trial.placed is not None:
+        shift = trial.placed.translation() - trial.held.translation()
+        measured["release_shift_m"] = float(np.linalg.norm(shift))
+    if trial.log:
+        time, normal, shear = plate_forces(trial)
+        until = start_of(trial, "approach") or np.inf
+        measured["place_normal_peak_N"] = float(normal[time < until].max())
+        measured["place_shear_peak_N"] = float(shear[time < until].max())
+    return measured
+
+
+def measure_push(trial: Trial) -> Measured:
+    """Return how far the jig went, how the part turned on it, and the forces."""
+    begun = start_of(trial, "push") if trial.log else None
+    if begun is None or trial.before is None:
+        return {}
+    time, normal, shear = plate_forces(trial)
+    after = trial.after if trial.after is not None else trial.last_jig
+    late = time >= begun
+    moved = after.translation() - trial.before.translation()
+    seen, printed = seen_displacement(trial.before, after)
+    turn = trial.before.rotation().inverse() @ after.rotation()
+    hand = np.linalg.norm(trial.log["hand_wrench"][:, 3:], axis=1)
+    measured = {
+        "displacement_m": float(np.hypot(*moved[:2])),
+        "displacement_seen_m": seen,
+        "printed_formula_m": printed,
+        "jig_yaw_rad": float(abs(np.arctan2(turn.matrix()[1, 0], turn.matrix()[0, 0]))),
+        "push_normal_peak_N": float(normal[late].max()),
+        "push_shear_peak_N": float(shear[late].max()),
+        "hand_force_peak_N": float(smoothed(hand, time)[late].max()),
+        "force_peaks": float(force_peaks(time, np.hypot(normal, shear), begun)),
+    }
+    if trial.placed is not None and trial.moved is not None:
+        measured["part_rotation_rad"] = angle_between(trial.placed, trial.moved)
+        measured["part_tilt_rad"] = tilt_between(trial.placed, trial.moved)
+    return measured
+
+
+def force_peaks(time: np.ndarray, force: np.ndarray, begun: float) -> int:
+    """Return how many peaks a plot of the plate's force shows: that of placing, that of pushing.
+
+    Args:
+        time: (n,) [s].
+        force: (n,) size of the force [N].
+        begun: When the push began [s]; the force just before it is that at rest.
+    """
+    placing, pushing = force[time < begun], force[time >= begun]
+    rest = placing[-1]
+    return 1 + int(pushing.max() - rest >= VISIBLE * (placing.max() - rest))
+
+
+def place_succeeded(trial: Trial, measured: Measured) -> bool:
+    """Return whether the part stands upright and at rest."""
+    stood = trial.failure is None and trial.placed is not None
+    return stood and measured["tilt_rad"] < UPRIGHT and measured["speed_m_per_s"] < AT_REST
+
+
+def push_succeeded(measured: Measured) -> bool:
+    """Return whether the jig went along, by the paper's limit."""
+    return measured.get("displacement_m", 0.0) > SUCCESS_DISTANCE

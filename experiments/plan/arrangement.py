@@ -1,0 +1,166 @@
+"""Where the parts are in a picture: on the jig before a step, or drawn apart."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+
+import numpy as np
+import trimesh
+
+from cell.product import Product
+from cell.soft_jig import BagParameters
+from experiments.plan.scene import Color, Shown
+from planning.fixing.algorithm import FixingStep
+from planning.fixing.directions import opposite, unit_vector
+from planning.holding.footprint import posture
+
+MOVED: Color = (0.93, 0.52, 0.13)
+ARROW: Color = (0.80, 0.10, 0.12)
+BAG: Color = (0.16, 0.33, 0.30)
+BASE: Color = (0.42, 0.44, 0.47)
+PARTS: tuple[Color, ...] = (  # Muted, told apart also without red and green.
+    (0.62, 0.66, 0.72),
+    (0.36, 0.52, 0.72),
+    (0.80, 0.72, 0.45),
+    (0.55, 0.42, 0.62),
+    (0.45, 0.62, 0.62),
+    (0.70, 0.55, 0.52),
+)
+MOST_LABELS = 14  # More would cover the picture.
+GAP = 0.35  # Of the size of what moves, between the parts in a picture.
+
+
+def step_arrangement(
+    product: Product, step: FixingStep, bag: BagParameters, depth: float
+) -> list[Shown]:
+    """Return the product in its posture on the jig, and what comes in with the mating arrow.
+
+    Args:
+        product: Its parts.
+        step: Algorithm 1's choice.
+        bag: Of the jig.
+        depth: How deep the fixed body is pressed in below the bag's apex [m].
+    """
+    turned = {n: _turned(product, n, step.up) for n in (*step.target, *step.incoming)}
+    below = step.incoming if step.posture == opposite(step.up) else step.target
+    moved = step.target if below is step.incoming else step.incoming
+    leaving = posture(step.up) @ unit_vector(
+        step.posture if moved is step.incoming else opposite(step.posture)
+    )
+    _on_the_bag(turned, below, bag, depth)
+    start = _apart([turned[n] for n in moved], [turned[n] for n in below], leaving)
+    for name in moved:
+        turned[name].apply_translation(start * leaving)
+    shown = [Shown(bag_mesh(bag), BAG, frame=False), Shown(base_mesh(bag), BASE, frame=False)]
+    shown += _parts(product, turned, moved)
+    return [*shown, Shown(arrow([turned[n] for n in moved], -leaving), ARROW)]
+
+
+def exploded(product: Product, steps: Sequence[FixingStep]) -> list[Shown]:
+    """Return the product drawn apart: each item moved out the way it came in."""
+    turned = {n: _turned(product, n, steps[0].up) for n in (*steps[0].target, *_incoming(steps))}
+    there = list(steps[0].target)
+    for step in steps:
+        leaving = posture(step.up) @ unit_vector(step.posture)
+        moved = [turned[name] for name in step.incoming]
+        distance = _apart(moved, [turned[name] for name in there], leaving)
+        for mesh in moved:
+            mesh.apply_translation(distance * leaving)
+        there += step.incoming
+    return _parts(product, turned, ())
+
+
+def _incoming(steps: Sequence[FixingStep]) -> list[str]:
+    return [name for step in steps for name in step.incoming]
+
+
+def _turned(product: Product, name: str, up: str) -> trimesh.Trimesh:
+    """Return a part in its assembled pose, the product turned with ``up`` up."""
+    part = product.parts[name]
+    mesh = trimesh.Trimesh(part.mesh.vertices, part.mesh.faces, process=False)
+    mesh.apply_transform(part.X_AP.GetAsMatrix4())
+    turn = np.eye(4)
+    turn[:3, :3] = posture(up)
+    return mesh.apply_transform(turn)
+
+
+def _on_the_bag(
+    turned: dict[str, trimesh.Trimesh], below: Iterable[str], bag: BagParameters, depth: float
+) -> None:
+    """Move everything so that the body below stands pressed into the middle of the bag."""
+    low, high = _box([turned[name] for name in below])
+    middle = (low + high) / 2
+    to_bag = np.array([-middle[0], -middle[1], bag.cap_height - depth - low[2]])
+    for mesh in turned.values():
+        mesh.apply_translation(to_bag)
+
+
+def _apart(
+    moved: Sequence[trimesh.Trimesh], staying: Sequence[trimesh.Trimesh], along: np.ndarray
+) -> float:
+    """Return how far to move along a direction until there is a gap [m]."""
+    (low, high), (low_there, high_there) = _box(moved), _box(staying)
+    axis, forward = int(np.argmax(np.abs(along))), along.sum() > 0
+    overlap = high_there[axis] - low[axis] if forward else high[axis] - low_there[axis]
+    return max(0.0, float(overlap)) + GAP * float(np.linalg.norm(high - low))
+
+
+def _box(meshes: Sequence[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
+    bounds = np.array([mesh.bounds for mesh in meshes])
+    return bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
+
+
+def _parts(
+    product: Product, turned: dict[str, trimesh.Trimesh], moved: Sequence[str]
+) -> list[Shown]:
+    """Return parts, one colour per item; of a group the first is labelled, for all."""
+    labels = _label_names(product, turned)
+    place = {n: k for k, item in enumerate(product.items()) for n in product.members(item)}
+    return [
+        Shown(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
+        for name, mesh in turned.items()
+    ]
+
+
+def _label_names(product: Product, names: Iterable[str]) -> dict[str, str]:
+    labels = {name: name for name in names}
+    for group, members in product.groups.items():
+        for number, name in enumerate(name for name in members if name in labels):
+            labels[name] = "" if number else group
+    named = [name for name, text in labels.items() if text]
+    return labels | dict.fromkeys(named[MOST_LABELS:], "")
+
+
+def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trimesh:
+    """Return an arrow beside a body that points along a direction."""
+    low, high = _box(meshes)
+    size = float(np.linalg.norm(high - low))
+    length, radius = max(0.6 * size, 0.015), max(0.02 * size, 0.0008)
+    shaft = trimesh.creation.cylinder(radius, 0.65 * length, sections=24)
+    shaft.apply_translation([0, 0, 0.325 * length])
+    # So few facets are shaded one by one; smooth, the point would be black as if it faced away.
+    tip = trimesh.creation.cone(2.5 * radius, 0.35 * length, sections=8)
+    tip.apply_translation([0, 0, 0.65 * length])
+    whole = trimesh.util.concatenate([shaft, tip])
+    turn = trimesh.geometry.align_vectors([0, 0, 1], along)
+    whole.apply_transform(turn)
+    beside = np.array([1.0, -1.0, 0.0]) if abs(along[2]) > 0.5 else np.array([0.0, 0.0, 1.0])
+    reach = np.abs(beside) @ (high - low) / 2 / np.abs(beside).sum() + 5 * radius
+    start = (low + high) / 2 + beside * reach - 0.3 * length * along
+    return whole.apply_translation(start)
+
+
+def bag_mesh(bag: BagParameters) -> trimesh.Trimesh:
+    """Return the bag at rest: a spherical cap on z = 0."""
+    angles = np.linspace(0.0, np.arcsin(bag.aperture_radius / bag.cap_radius), 24)
+    if bag.cap_height > bag.cap_radius:
+        angles = np.linspace(0.0, np.pi - angles[-1], 24)
+    profile = bag.cap_radius * np.column_stack([np.sin(angles), np.cos(angles)])
+    profile[:, 1] -= bag.cap_radius - bag.cap_height
+    return trimesh.creation.revolve(profile[::-1], sections=96)
+
+
+def base_mesh(bag: BagParameters) -> trimesh.Trimesh:
+    """Return the jig's base plate as a disc below z = 0."""
+    disc = trimesh.creation.cylinder(1.35 * bag.aperture_radius, 0.012, sections=96)
+    return disc.apply_translation([0, 0, -0.006])

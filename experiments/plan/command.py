@@ -1,0 +1,142 @@
+"""``soft-jig plan``: decide what is fixed on the jig for each step of an assembly."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from rich.console import Console
+
+from cell.config import CellConfig
+from cell.loading import load_product
+from cell.product import Product
+from experiments.plan.options import PlanOptions
+from experiments.plan.page import write_page
+from experiments.reporting.output import write_arrays
+from planning.fixing.directions import DIRECTIONS
+from planning.fixing.evidence import evidence_text
+from planning.fixing.explain import explanation, step_table, step_texts, stop_text
+from planning.fixing.plan_file import save_plan
+from planning.fixing.planner import FixingPlan, plan
+from planning.fixing.remark import bolt_remarks
+from planning.holding.candidate import Choice, Setup
+from planning.holding.choice_file import choices_text, choices_to_list
+from planning.holding.rule import general_rule
+from planning.ordering.explain import advice_text
+
+MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, also into a file.
+
+
+def run_plan(
+    product: str,
+    order: tuple[str, ...] | None,
+    options: PlanOptions,
+    explain: bool,
+    out: Path,
+    *,
+    config: CellConfig | None = None,
+    html: bool = False,
+) -> int:
+    """Plan a product, print the plan, and write ``plan.json`` and ``matrices.npz``.
+
+    Args:
+        product: A name in ``models/products``, or what else ``load_product`` reads.
+        order: Parts or groups in the order of assembly, or None for the product's default.
+        options: How the product is read and planned.
+        explain: Whether to print matrices, reasons, candidates and evidence as well.
+        out: Folder for the files; made if missing.
+        config: The cell that the general rule reckons with; None for the default.
+        html: Whether to write ``plan.html``, too.
+
+    Returns:
+        0 if the order is feasible, 1 if it is well formed but infeasible.
+
+    Raises:
+        CellError: The product or the order cannot be used; nothing is written.
+    """
+    described = _described(product, options)
+    console = _console()
+    with console.status("Matrices, steps and orders ..."):
+        fixing = plan(
+            described,
+            order,
+            tolerance=options.tolerance,
+            cache=options.cache,
+            slanted=options.slanted,
+        )
+    assert fixing.geometry is not None
+    _print_plan(console, fixing, explain)
+    setup, started = Setup.of(config or CellConfig()), time.perf_counter()
+    with console.status("Ways to hold it, by the general rule ..."):
+        choices = general_rule(described, fixing, setup)
+    seconds = {"general rule": time.perf_counter() - started}
+    remarks = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
+    out.mkdir(parents=True, exist_ok=True)
+    page = out / "plan.html"
+    page.unlink(missing_ok=True)  # An earlier plan's page is not this one's.
+    save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
+    save_matrices(fixing, out / "matrices.npz")
+    if html:
+        with console.status(f"Pictures for {page.name} ..."):
+            seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
+    _print_rule(console, choices, explain, remarks)
+    _print_times(console, fixing, seconds)
+    return 0 if fixing.feasible else 1
+
+
+def _described(product: str, options: PlanOptions) -> Product:
+    described = load_product(
+        product, options.units, densities=options.densities, group=options.group
+    )
+    return replace(described, up=options.up) if options.up else described
+
+
+def save_matrices(fixing: FixingPlan, file: Path) -> None:
+    """Write C (n, n), M and W (6, n, n), and the names of their rows and layers."""
+    arrays = {
+        "parts": np.array(fixing.parts),
+        "directions": np.array(DIRECTIONS),
+        "contact": fixing.contact,
+        "free": np.stack([fixing.free[j] for j in DIRECTIONS]),
+        "reachable": np.stack([fixing.reachable[j] for j in DIRECTIONS]),
+    }
+    write_arrays(file, arrays)
+
+
+def _console() -> Console:
+    console = Console(highlight=False)
+    console.width = max(console.width, MIN_WIDTH)
+    return console
+
+
+def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
+    console.print(step_table(fixing))
+    lines = [explanation(fixing)] if explain else step_texts(fixing)
+    lines += [stop_text(fixing)] if fixing.stop else []
+    lines += [advice_text(fixing.orders)] if fixing.orders else []
+    lines += [evidence_text(fixing.evidence)] if fixing.evidence else []
+    _print_lines(console, lines)
+
+
+def _print_rule(
+    console: Console, choices: tuple[Choice, ...], explain: bool, remarks: list[str]
+) -> None:
+    if explain and choices:
+        lines = ["Candidates, by the general rule:\n" + choices_text(choices)]
+    else:
+        lines = [f"{choice.item}: {choice.verdict}" for choice in choices if not choice.agrees]
+    _print_lines(console, lines + remarks)
+
+
+def _print_times(console: Console, fixing: FixingPlan, seconds: dict[str, float]) -> None:
+    if fixing.orders:
+        seconds = {"orders": fixing.orders.seconds} | seconds
+    apart = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
+    _print_lines(console, [f"Planned in {fixing.seconds:.2f} s; {apart}."])
+
+
+def _print_lines(console: Console, lines: list[str]) -> None:
+    for line in lines:
+        console.print(line, markup=False, soft_wrap=True)

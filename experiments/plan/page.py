@@ -1,0 +1,212 @@
+"""``plan.html``: the whole plan on one page that works offline."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from cell.product import Product
+from experiments.plan.arrangement import exploded, step_arrangement
+from experiments.plan.heatmaps import contact_map, direction_maps
+from experiments.plan.scene import Shown, figure, picture
+from experiments.reporting.html_page import figures, page, pairs, section, table
+from experiments.reporting.output import write_text
+from experiments.reporting.render import rendering_problem
+from planning.fixing.algorithm import READING
+from planning.fixing.directions import opposite
+from planning.fixing.evidence import evidence_text
+from planning.fixing.explain import blocker_text, step_texts, stop_text
+from planning.fixing.order import together
+from planning.fixing.planner import FixingPlan
+from planning.holding.candidate import CRITERIA, Candidate, Choice, Setup
+from planning.holding.footprint import USUAL_DEPTH
+from planning.ordering.advice import OrderAdvice
+from planning.ordering.explain import advice_text, arrow_text
+
+MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
+MOST_BLOCKERS = 400
+
+
+def write_page(
+    path: Path,
+    product: Product,
+    plan: FixingPlan,
+    choices: Sequence[Choice],
+    setup: Setup,
+    notes: Sequence[str] = (),
+) -> float:
+    """Write the page; return the time it took [s].
+
+    Args:
+        path: The HTML file; it appears whole or not at all.
+        product: What was planned.
+        plan: Its plan.
+        choices: What the general rule says, per step.
+        setup: The cell.
+        notes: What the reader has to know besides.
+    """
+    started = time.perf_counter()
+    problem = rendering_problem()
+    missing = [f"No pictures: {problem}."] if problem else []
+    sections = [
+        _summary(plan, [*notes, *missing]),
+        section("Orders", _orders(plan.orders)),
+        section("Steps", _steps(product, plan, choices, setup, pictured=problem is None)),
+        section("Exploded view", "" if problem else _exploded(product, plan)),
+        section("Matrices", _matrices(plan)),
+        section("What the matrices rest on", _evidence(plan)),
+        section("What blocks what", _blockers(plan)),
+    ]
+    body = "\n".join(filter(None, sections))
+    write_text(path, page(f"{plan.product}: plan", body))
+    return time.perf_counter() - started
+
+
+def _summary(plan: FixingPlan, notes: Sequence[str]) -> str:
+    facts = {
+        "order": ", ".join(plan.order),
+        "parts": f"{len(plan.parts)}",
+        "up on the jig": plan.steps[0].up if plan.steps else "",
+        "planned in": f"{plan.seconds:.3f} s",
+    }
+    verdict = "success" if plan.feasible else "failure"
+    words = "feasible" if plan.feasible else "infeasible"
+    stop = f"<pre>{escape(stop_text(plan))}</pre>" if plan.stop else ""
+    paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
+    return (
+        f"<h1>{escape(plan.product)}: plan</h1>\n"
+        f'<p><span class="verdict {verdict}">{words}</span></p>\n{stop}{paragraphs}{pairs(facts)}'
+    )
+
+
+def _orders(advice: OrderAdvice | None) -> str:
+    if advice is None:
+        return ""
+    text = f"<pre>{escape(advice_text(advice))}</pre>"
+    if not advice.ranked:
+        return text
+    first = escape(advice.ranked[0].order[0])
+    arrows = "".join(f"<li>{escape(arrow_text(arrow))}</li>" for arrow in advice.precedence)
+    listed = f"<ul>{arrows}</ul>" if arrows else "<p>None.</p>"
+    return f"{text}<h3>Precedence, in every order that begins with {first}</h3>{listed}"
+
+
+def _steps(
+    product: Product, plan: FixingPlan, choices: Sequence[Choice], setup: Setup, pictured: bool
+) -> str:
+    scores = f"<details><summary>What the scores mean</summary>{pairs(CRITERIA)}</details>"
+    parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
+    reasons = step_texts(plan)
+    for number, step in enumerate(plan.steps):
+        choice = choices[number] if number < len(choices) else None
+        parts.append(f"<h3>{number + 1}. {escape(step.item)}</h3>")
+        if pictured and number < MOST_STEPS_PICTURED:
+            parts.append(_picture(product, plan, number, choice, setup))
+        parts.append(
+            f"<p><b>Algorithm 1: {escape(step.posture)} / {escape(step.fixed_part)}.</b> "
+            f"{escape(reasons[number].strip())}</p>"
+        )
+        parts.append(_choice(choice) if choice else "")
+    if pictured and len(plan.steps) > MOST_STEPS_PICTURED:
+        parts.append(f"<p>The first {MOST_STEPS_PICTURED} steps are pictured.</p>")
+    return "\n".join(parts) if plan.steps else ""
+
+
+def _picture(
+    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: Setup
+) -> str:
+    step = plan.steps[number]
+    figured = choice.candidates[choice.paper].figures if choice else {}
+    depth = figured.get("depth_m", USUAL_DEPTH)
+    shown = step_arrangement(product, step, setup.jig.bag, depth)
+    sides = [step.item, together(plan.order[: number + 1])]
+    moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
+    return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
+
+
+def _exploded(product: Product, plan: FixingPlan) -> str:
+    return (
+        _figure(exploded(product, plan.steps), "Each item moved out the way it comes in")
+        if plan.steps
+        else ""
+    )
+
+
+def _figure(shown: Sequence[Shown], caption: str) -> str:
+    png, view = picture(shown)
+    return figure(png, view, shown, caption)
+
+
+def _choice(choice: Choice) -> str:
+    passed = [_row(number, c, choice) for number, c in enumerate(choice.candidates, start=1)
+              if not c.rejected]  # fmt: skip
+    rejected = [c for c in choice.candidates if c.rejected]
+    notes = [(c, note) for c in choice.candidates for note in c.notes]
+    kind = "agree" if choice.agrees else "differ"
+    return (
+        f'<p class="{kind}"><b>General rule:</b> {escape(choice.verdict)}</p>'
+        f"{table(passed, list(passed[0])) if passed else ''}"
+        f"{_about(choice, notes)}<details><summary>{len(rejected)} rejected</summary>"
+        f"{_about(choice, [(c, c.rejected) for c in rejected])}</details>"
+    )
+
+
+def _about(choice: Choice, remarks: Sequence[tuple[Candidate, str]]) -> str:
+    lines = "".join(
+        f"<li>{escape(c.label + _by_paper(choice, c))}: {escape(text)}</li>" for c, text in remarks
+    )
+    return f"<ul>{lines}</ul>" if lines else ""
+
+
+def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]:
+    return {
+        "": number,
+        "on the jig": candidate.name + _by_paper(choice, candidate),
+        "up": candidate.up,
+        "from": candidate.approach.removeprefix("the "),
+        "score": f"{candidate.score:.2f}",
+        **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
+        "bears / pushed across [N]": (
+            f"{candidate.figures['bears_across_N']:.1f} / "
+            f"{candidate.figures['pushed_across_N']:.1f}"
+        ),
+    }
+
+
+def _by_paper(choice: Choice, candidate: Candidate) -> str:
+    return " (Algorithm 1)" if candidate is choice.candidates[choice.paper] else ""
+
+
+def _matrices(plan: FixingPlan) -> str:
+    return figures(
+        [
+            ("C: blue where two parts touch", contact_map(plan.parts, plan.contact)),
+            (
+                "M: blue where the row's part leaves the column's part along the direction",
+                direction_maps(plan.parts, plan.free, "M"),
+            ),
+            (
+                "W: blue where they touch as well, so that the row's part can be mated that way",
+                direction_maps(plan.parts, plan.reachable, "W"),
+            ),
+        ]
+    )
+
+
+def _evidence(plan: FixingPlan) -> str:
+    return f"<pre>{escape(evidence_text(plan.evidence))}</pre>" if plan.evidence else ""
+
+
+def _blockers(plan: FixingPlan) -> str:
+    lines = [blocker_text(blocker) for blocker in plan.blockers[:MOST_BLOCKERS]]
+    more = len(plan.blockers) - len(lines)
+    text = "\n".join(lines + ([f"... and {more} more in plan.json"] if more else []))
+    return (
+        f"<details><summary>{len(plan.blockers)} blocked motions</summary>"
+        f"<pre>{escape(text)}</pre></details>"
+        if lines
+        else ""
+    )

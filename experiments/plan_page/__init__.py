@@ -1,1 +1,0 @@
-"""``plan.html``: a plan as a page to look at."""

@@ -1,0 +1,97 @@
+"""The report of a run: one HTML file that holds its pictures and works offline."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Mapping, Sequence
+from html import escape
+from pathlib import Path
+from typing import Any
+
+from experiments.reporting.html_page import Picture, cell, figures, page, pairs, section, table
+from experiments.reporting.output import write_text
+
+SUMMARY = ("command", "product", "order", "seed", "real_time_factor")
+STEP_COLUMNS = ("name", "operation", "verdict", "sim_seconds", "cpu_seconds")
+PLAN_COLUMNS = ("target", "incoming", "directions", "posture", "fixed_part", "up", "cog_height_m")
+CASE_COLUMNS = (
+    "part", "posture", "direction", "meaning", "trials", "successes", "expected", "verdict",
+)  # fmt: skip
+OUTCOME_COLUMNS = ("quantity", "outcome", "trials", "mean", "interval", "paper_mean", "welch_p")
+
+
+def write_report(
+    path: Path,
+    *,
+    title: str,
+    plan: Mapping[str, Any],
+    result: Mapping[str, Any],
+    pictures: Sequence[Picture] = (),
+    plots: Sequence[Picture] = (),
+    notes: Sequence[str] = (),
+) -> None:
+    """Write a self-contained report.
+
+    Args:
+        path: The HTML file; it appears whole or not at all.
+        title: Of the page.
+        plan: What ``plan.json`` holds; empty if nothing was planned.
+        result: What ``result.json`` holds, with ``steps`` or ``cases``.
+        pictures: Caption and PNG each, in order.
+        plots: The same.
+        notes: What the reader has to know, for example why there are no pictures.
+    """
+    sections = [
+        _summary(title, result, notes),
+        section("Pictures", figures(pictures)),
+        section("Steps", table(result.get("steps", ()), STEP_COLUMNS)),
+        section("Cases", table(result.get("cases", ()), CASE_COLUMNS)),
+        section("Successes and failures", table(_outcomes(result), OUTCOME_COLUMNS)),
+        section("Measured", _measured(result)),
+        section("Plan", _plan(plan)),
+        section("Plots", figures(plots)),
+        section("Versions", pairs(result.get("versions", {}))),
+        section("Configuration", _json(result.get("config", {}))),
+    ]
+    write_text(path, page(title, "\n".join(filter(None, sections))))
+
+
+def _summary(title: str, result: Mapping[str, Any], notes: Sequence[str]) -> str:
+    facts = {name: result[name] for name in SUMMARY if name in result}
+    verdict = cell(result["verdict"]) if "verdict" in result else ""
+    paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
+    return f"<h1>{escape(title)}</h1>\n<p>{verdict}</p>\n{paragraphs}{pairs(facts)}"
+
+
+def _measured(result: Mapping[str, Any]) -> str:
+    """Everything measured, one line per step and quantity."""
+    rows = []
+    for step in (*result.get("steps", ()), *result.get("cases", ())):
+        name = step.get("name") or "/".join(
+            str(step[key]) for key in ("part", "posture", "direction") if key in step
+        )
+        for quantity, value in step.get("measured", {}).items():
+            rows.append({"step": name, "quantity": quantity, "value": value})
+    return table(rows, ("step", "quantity", "value"))
+
+
+def _outcomes(result: Mapping[str, Any]) -> list[dict[str, Any]]:
+    """Everything compared between successful and failed trials, one line per quantity and group."""
+    return [
+        {"quantity": quantity, "outcome": outcome, **group, "welch_p": groups.get("welch_p")}
+        for quantity, groups in result.get("by_outcome", {}).items()
+        for outcome, group in groups.items()
+        if outcome != "welch_p"
+    ]
+
+
+def _plan(plan: Mapping[str, Any]) -> str:
+    steps = plan.get("steps", ())
+    reasons = [f"<li>{escape(str(step['reason']))}</li>" for step in steps if "reason" in step]
+    listed = f"<ol>{''.join(reasons)}</ol>" if reasons else ""
+    return table(steps, PLAN_COLUMNS) + listed
+
+
+def _json(value: Mapping[str, Any]) -> str:
+    text = json.dumps(value, indent=2, default=str)
+    return f"<details><summary>All settings</summary><pre>{escape(text)}</pre></details>"

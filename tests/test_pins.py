@@ -1,0 +1,99 @@
+"""Pins in the frozen bed: which surface counts, and how it pushes, yields and lets go."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+from cell.soft_jig import JigParameters, SurfaceSamples
+from cell.soft_jig.bed import Bed
+from cell.soft_jig.contact_mesh import bed_mesh
+from cell.soft_jig.parameters import SoilParameters
+from cell.soft_jig.pins import Pins
+from cell.soft_jig.yielding import Strength
+
+WIDTH, LENGTH = 0.002, 0.020
+MODULUS = 4e8
+STRENGTH = Strength.of(SoilParameters(), 90e3)
+STAYS = np.eye(3)
+HEAVY = np.diag([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
+PARAMS = JigParameters()
+APEX = PARAMS.bag.cap_height
+
+
+def pin(samples: SurfaceSamples | None = None, inertia: np.ndarray = HEAVY) -> Pins:
+    """Return a square pin that reaches half its length into the middle of the bare dome."""
+    box = trimesh.creation.box((WIDTH, WIDTH, LENGTH))
+    samples = samples or SurfaceSamples.of("pin", box, spacing=0.0005)
+    mesh = bed_mesh(Bed(PARAMS.bag, PARAMS.soil), PARAMS.jammed)
+    return Pins.inside(mesh, samples, at(), MODULUS, inertia, 1e-3)
+
+
+def at(x: float = 0.0, z: float = 0.0) -> tuple[np.ndarray, np.ndarray]:
+    return STAYS, np.array([x, 0.0, APEX + z])
+
+
+def test_only_what_is_among_the_beads_counts() -> None:
+    """Four sides over half the length, and the tip."""
+    expected = 4 * WIDTH * LENGTH / 2 + WIDTH**2
+    found = pin()
+    assert found.areas.sum() == pytest.approx(expected, rel=0.1)
+    assert found.p_JS[:, 2].max() < APEX
+
+
+def test_what_lies_on_the_surface_is_left_to_the_mesh() -> None:
+    """A plate that rests on the dome's apex does not count with its underside."""
+    plate = trimesh.creation.box((0.01, 0.01, 0.005))
+    plate.apply_translation([0, 0, 0.0025 - 0.2e-3])
+    assert np.all(pin(SurfaceSamples.of("plate", plate)).normals[:, 2] == 0)
+
+
+def test_small_push_is_elastic_on_the_front_face() -> None:
+    """Force is modulus times depth times the projected area, at half the depth of the pin."""
+    depth = 0.1e-3
+    force, torque = pin().push(at(depth), STRENGTH)
+    area = WIDTH * LENGTH / 2
+    assert force == pytest.approx([-MODULUS * depth * area, 0, 0], rel=0.1, abs=1e-3)
+    assert torque[1] == pytest.approx(-force[0] * LENGTH / 4, rel=0.15)
+
+
+def test_strong_push_is_held_at_the_strength_of_the_beads() -> None:
+    """2 c sqrt(Kp) on the side, c Nc under the tip."""
+    force, _ = pin().push(at(2e-3), STRENGTH)
+    assert force[0] == pytest.approx(-STRENGTH.lateral * WIDTH * LENGTH / 2, rel=0.1)
+    force, _ = pin().push(at(z=-2e-3), STRENGTH)
+    assert force[2] == pytest.approx(STRENGTH.bearing * WIDTH**2, rel=0.1)
+
+
+def test_what_yielded_stays_a_gap() -> None:
+    """After a push by 2 mm the pin is free until it is back where the beads gave way to."""
+    pushed = pin()
+    pushed.push(at(2e-3), STRENGTH)
+    given = 2e-3 - STRENGTH.lateral / MODULUS
+    assert pushed.push(at(given - 1e-5), STRENGTH)[0] == pytest.approx(np.zeros(3), abs=1e-9)
+    assert pushed.push(at(given + 1e-5), STRENGTH)[0][0] < -0.01
+
+
+def test_pin_is_pulled_out_freely() -> None:
+    """Nothing holds it back: beads under vacuum do not stick to it."""
+    force, torque = pin().push(at(z=3e-3), STRENGTH)
+    assert force == pytest.approx(np.zeros(3), abs=1e-9)
+    assert torque == pytest.approx(np.zeros(3), abs=1e-9)
+
+
+def test_light_part_gets_softer_springs() -> None:
+    """An explicit step of 1 ms carries less stiffness on 1 g than the beads have."""
+    light = pin(inertia=np.diag([1e-8, 1e-8, 1e-8, 1e-3, 1e-3, 1e-3]))
+    assert light.modulus < MODULUS / 10
+    assert pin().modulus == MODULUS
+
+
+def test_saved_pins_continue_alike() -> None:
+    """Also after they have yielded."""
+    pushed = pin()
+    pushed.push(at(1e-3), STRENGTH)
+    again = Pins.from_arrays(pushed.arrays())
+    pushed.push(at(0.9e-3), STRENGTH)
+    forces = [pins.push(at(0.9e-3), STRENGTH)[0] for pins in (pushed, again)]
+    assert np.array_equal(forces[0], forces[1])
