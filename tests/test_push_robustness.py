@@ -7,10 +7,10 @@ from experiments.push_robustness import (
     CONTROLS,
     NUMERICS,
     PARAMETERS,
-    SPREAD,
     Options,
     coasting_speed,
     flips,
+    main,
     scaled,
     value_at,
     variants,
@@ -24,13 +24,14 @@ def test_configured_speed_is_that_of_the_papers_mean_success() -> None:
 
 
 def test_samples_stay_within_the_spread_and_repeat() -> None:
-    options, config = Options(samples=3, one_by_one=True, numerics=True), CellConfig()
+    options = Options(samples=3, spread=0.2, one_by_one=True, numerics=True)
+    config = CellConfig()
     found = variants(options, config)
     assert found == variants(options, config)
     assert len(found) == 1 + len(NUMERICS) + 2 * len(PARAMETERS) + 3
     for variant in found[1 + len(NUMERICS) :]:
         for path, value in variant.changes.items():
-            assert abs(value / value_at(config, path) - 1) <= SPREAD + 1e-12
+            assert abs(value / value_at(config, path) - 1) <= options.spread + 1e-12
 
 
 @pytest.mark.parametrize("path", PARAMETERS)
@@ -56,3 +57,14 @@ def test_a_flip_is_an_outcome_that_differs_from_the_configured_one() -> None:
     other = {"outcome": {"a": "failure", "b": "failure"}, "displacement_m": {"a": 0.02, "b": 0.0}}
     assert flips(other, base) == ["a (20 mm)"]
     assert flips(base, base) == []
+
+
+@pytest.mark.parametrize(
+    ("arguments", "culprit"),
+    [("--samples -1", "--samples"), ("--spread 1", "--spread"), ("--case motor/P9", "motor/P9")],
+)
+def test_bad_usage_is_named(
+    arguments: str, culprit: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(arguments.split()) == 2
+    assert culprit in capsys.readouterr().err

@@ -68,7 +68,7 @@ class Regress:
     """Run experiments with seed 0 and compare outcomes and metrics with the stored ones."""
 
     suite: Literal["quick", "full"] = "quick"
-    """quick: three cases, minutes; full: every case three times."""
+    """quick: four cases, minutes; full: every case three times."""
 
     update: bool = False
     """Store what comes out, and print what changes."""

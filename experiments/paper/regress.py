@@ -77,10 +77,18 @@ class Suite:
     trials: int
 
 
+# Two pushes that succeed and one that fails, none of them near the border: motor P2-a, which wedges
+# or topples as rounding has it, is in the full suite only.
+QUICK = (
+    ("place", "motor/P2"),
+    ("push", "motor/P1/a"),
+    ("push", "plate/P2/a"),
+    ("push", "plate/P2/c"),
+)
 SUITES = {
     suite.name: suite
     for suite in (
-        Suite("quick", (("place", "motor/P2"), ("push", "motor/P2/a"), ("push", "plate/P2/c")), 1),
+        Suite("quick", QUICK, 1),
         Suite("full", (("place", None), ("push", None)), 3),
     )
 }
