@@ -63,13 +63,30 @@ def test_step_assembly_is_planned(tmp_path: Path, capsys: pytest.CaptureFixture)
     assert (out / "plan.json").exists() and printed.err == ""
 
 
+def test_gltf_keeps_names_and_poses(tmp_path: Path) -> None:
+    """Two nodes of one shape."""
+    pin = trimesh.creation.box((0.004, 0.004, 0.01))
+    scene = trimesh.Scene()
+    for name, x in (("left pin", -0.01), ("right pin", 0.01)):
+        pose = trimesh.transformations.translation_matrix([x, 0, 0])
+        scene.add_geometry(pin, node_name=name, geom_name="pin", transform=pose)
+    scene.export(tmp_path / "pins.glb")
+    product = load_product(tmp_path / "pins.glb")
+    assert list(product.parts) == ["left_pin", "right_pin"]
+    assert product.parts["right_pin"].mesh.centroid[0] == pytest.approx(0.01)
+    assert product.parts["left_pin"].mesh.volume == pytest.approx(pin.volume)
+    with pytest.raises(CellError, match="states its own units"):
+        load_product(tmp_path / "pins.glb", "mm")
+
+
+@pytest.mark.parametrize("suffix", ["step", "glb"])
 @pytest.mark.parametrize("text", ["", "ISO-10303-21; rubbish", "\0\1\2"])
-def test_a_broken_step_file_is_one_line(tmp_path: Path, text: str, capfd) -> None:
-    """OpenCASCADE's own complaints stay off the terminal."""
-    (tmp_path / "bad.step").write_text(text)
-    assert main(["plan", str(tmp_path / "bad.step"), "--out", str(tmp_path / "out")]) == 2
+def test_a_broken_assembly_file_is_one_line(tmp_path: Path, text: str, suffix, capfd) -> None:
+    """The readers' own complaints stay off the terminal."""
+    (tmp_path / f"bad.{suffix}").write_text(text)
+    assert main(["plan", str(tmp_path / f"bad.{suffix}"), "--out", str(tmp_path / "out")]) == 2
     printed = capfd.readouterr()
-    assert printed.out == "" and "bad.step' " in printed.err and printed.err.count("\n") == 1
+    assert printed.out == "" and f"bad.{suffix}' " in printed.err and printed.err.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -168,6 +185,14 @@ def folder_of(folder: Path, shapes: dict[str, Manifold]) -> Path:
 LOW, HIGH = box((20, 20, 20), (0, 0, 0)), box((20, 20, 20), (0, 0, 20))
 
 
+@pytest.mark.parametrize(("up", "fixed"), [("+z", "+z / low"), ("-z", "+z / high")])
+def test_up_is_an_option_where_no_file_states_it(tmp_path: Path, up, fixed, capsys) -> None:
+    folder_of(tmp_path, {"low": LOW, "high": HIGH})
+    options = ["--units", "mm", "--order", "low,high", f"--up={up}", "--no-html"]
+    assert main(["plan", str(tmp_path), "--out", str(tmp_path / "out"), *options]) == 0
+    assert fixed in capsys.readouterr().out
+
+
 @pytest.mark.parametrize(
     ("shapes", "options", "code", "message"),
     [
@@ -177,11 +202,12 @@ LOW, HIGH = box((20, 20, 20), (0, 0, 0)), box((20, 20, 20), (0, 0, 20))
         ({"low": LOW, "high": HIGH}, ["--units", "feet"], 2, "No unit 'feet'"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm"], 0, "Tolerance 0.05 mm, by default"),
         ({"low": LOW}, ["--units", "mm"], 0, "'low' is the only part: there is nothing"),
+        ({"low": LOW, "high": HIGH}, ["--units", "mm", "--group"], 0, "'highs' is the only item"),
         (
             {"low": LOW, "high": HIGH.translate([0, 0, 3])},
             ["--units", "mm", "--order", "low,high"],
             1,
-            "touches no other part",
+            "high, low touch no other part",
         ),
         (
             {"low": LOW, "high": HIGH.translate([1, 1, -2])},
@@ -190,6 +216,7 @@ LOW, HIGH = box((20, 20, 20), (0, 0, 0)), box((20, 20, 20), (0, 0, 20))
             "'high' and 'low' overlap by .* mm",
         ),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--order", "low"], 2, "lacks high"),
+        ({"low": LOW, "high": HIGH}, ["--units", "mm", "--up", "z"], 2, "No up axis 'z'"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--order", "low,low"], 2, "repeats low"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--density", "x"], 2, "--density x: write"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--tolerance-mm", "0"], 2, "between 0"),

@@ -40,9 +40,18 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
 
 def test_plan_gets_its_options(calls: list[dict], tmp_path: Path) -> None:
     options = ["--order", "a,b", "--units", "in", "--explain", "--out", str(tmp_path)]
-    options += ["--density", "7850", "--density", "a=1000", "--group", "--tolerance-mm", "0.02"]
+    options += [
+        "--density",
+        "7850",
+        "--density",
+        "a=1000",
+        "--group",
+        "--tolerance-mm",
+        "0.02",
+        "--up=-z",
+    ]
     assert main(["plan", "folder", *options, "--no-cache", "--no-html"]) == 0
-    expected = PlanOptions("in", {"": 7850.0, "a": 1000.0}, True, 1e-3 * 0.02)
+    expected = PlanOptions("in", {"": 7850.0, "a": 1000.0}, True, 1e-3 * 0.02, up="-z")
     (call,) = calls
     assert call == dict(
         product="folder", order=("a", "b"), options=expected, explain=True, html=False

@@ -20,7 +20,7 @@ from planning.holding.candidate import Candidate, Choice, Setup
 from planning.holding.capacity import Load, passive_pressure, sideways_capacity, turning_capacity
 from planning.holding.footprint import footprint, posture
 from planning.holding.gravity import Gravity
-from planning.holding.gripper import STROKE, Gripper
+from planning.holding.gripper import BELOW, STROKE, Gripper
 from planning.holding.imprint import Imprint, press, samples_of
 from planning.holding.rule import general_rule
 
@@ -174,11 +174,14 @@ def test_pieces_of_a_group_are_carried_one_by_one():
     assert gravity.dropped(("pin_1", "pin_2"), "-z") == []
 
 
-@pytest.mark.parametrize(("size", "possible"), [((40, 90, 10), True), ((60, 90, 10), False)])
-def test_grip_needs_a_place_narrower_than_the_stroke(size, possible):
+@pytest.mark.parametrize(
+    ("size", "obstacle"),
+    [((40, 90, 10), ""), ((60, 90, 10), "60 mm across, the gripper opens 50 mm")],
+)
+def test_grip_needs_a_place_narrower_than_the_stroke(size, obstacle):
     product = product_of({"bar": box(size, (0, 0, 0))})
     width, found = Gripper(product, geometry_of(product)).width(("bar",), posture("+z"))
-    assert width == pytest.approx(min(size[:2]) * 1e-3) and found is possible
+    assert width == pytest.approx(min(size[:2]) * 1e-3) and found == obstacle
     assert pytest.approx(0.050) == STROKE
 
 
@@ -186,8 +189,8 @@ def test_declared_grasps_decide_and_must_not_come_from_below():
     motor_unit = load_product("motor_unit")
     geometry = geometry_of(motor_unit)
     gripper = Gripper(motor_unit, geometry)
-    assert gripper.width(("plate",), posture("+z")) == (0.07, True)
-    assert gripper.width(("bolt_1",), posture("-z"))[1] is False
+    assert gripper.width(("plate",), posture("+z")) == (0.07, "")
+    assert gripper.width(("bolt_1",), posture("-z"))[1] == BELOW
 
 
 @pytest.fixture(scope="module")

@@ -79,7 +79,7 @@ def test_a_missing_file_is_refused(tmp_path):
 def test_explanation_names_pair_direction_and_point():
     fixing = plan(interlocked_links())
     assert fixing.stop is not None
-    for text in (explanation(fixing), stop_text(fixing.stop)):
+    for text in (explanation(fixing), stop_text(fixing)):
         assert "-x: link_2 hits link_1 at (15.00," in text
         assert "mm after 15.00 mm" in text
 
@@ -135,7 +135,7 @@ def test_command_plans_the_motor_unit(capsys, tmp_path):
 def test_command_names_the_nearest_order(capsys, tmp_path):
     assert run_plan("motor_unit", ("motor", "bolts", "plate"), PlanOptions(), False, tmp_path) == 1
     text = capsys.readouterr().out
-    assert "Infeasible: plate cannot be added to motor, bolt_1" in text
+    assert "Infeasible: plate cannot be added to motor + bolts" in text
     assert "+z: plate hits bolt_1 at (" in text
     assert "Nearest feasible order: motor,plate,bolts (1 pair of items exchanged)." in text
 

@@ -82,7 +82,7 @@ def _operations(job: Job, fixing: FixingPlan) -> list[Operation]:
         NoOperation: The plan is infeasible, or no operation carries it out.
     """
     if fixing.stop is not None:
-        raise NoOperation(stop_text(fixing.stop))
+        raise NoOperation(stop_text(fixing))
     todo = operations(job.product, fixing)
     kinds = [operation.kind for operation in todo]
     return todo[: kinds.index(job.last) + 1] if job.last in kinds else todo

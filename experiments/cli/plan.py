@@ -22,19 +22,22 @@ class Plan:
     """Decide, for each assembly step, which part the jig holds and in which posture."""
 
     product: Annotated[Positional[str], arg(metavar="PRODUCT")]
-    """A name in models/products, a YAML or STEP file, or a folder of meshes in assembled pose."""
+    """A name in models/products, a YAML, STEP or GLB file, or a folder of meshes, assembled."""
 
     order: Annotated[str | None, arg(metavar="A,B,C")] = None
-    """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
+    """Assembly order: parts or groups, separated by commas. Default: the product's, or the best."""
 
     units: Annotated[str | None, arg(metavar="mm|cm|m|in")] = None
     """Unit of a folder's meshes; needed unless all of them are .glb."""
 
     density: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="[PART=]KG_M3")] = ()
-    """Density of a part, or of all that are not named; of a STEP file or folder. Repeatable."""
+    """Density of a part, or of all that are not named; a YAML file states masses. Repeatable."""
 
     group: bool = False
     """Make one item of the order of parts that are identical."""
+
+    up: Annotated[str | None, arg(metavar="+x|-x|...|-z")] = None
+    """Axis that points up on the jig; write --up=-z. Default: the product's, or +z."""
 
     tolerance_mm: Annotated[float | None, arg(metavar="MM")] = None
     """Gap that still touches, overlap that does not block. Default: the product's, or derived."""
@@ -84,6 +87,7 @@ class Plan:
             tolerance=None if self.tolerance_mm is None else 1e-3 * self.tolerance_mm,
             cache=None if self.no_cache else user_cache(),
             slanted=self.slanted,
+            up=self.up,
         )
 
 

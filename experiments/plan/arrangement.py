@@ -113,11 +113,11 @@ def _box(meshes: Sequence[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
 def _parts(
     product: Product, turned: dict[str, trimesh.Trimesh], moved: Sequence[str]
 ) -> list[Shown]:
-    """Return coloured parts; of a group the first is labelled, for all."""
+    """Return parts, one colour per item; of a group the first is labelled, for all."""
     labels = _label_names(product, turned)
-    place = list(product.parts).index
+    place = {n: k for k, item in enumerate(product.items()) for n in product.members(item)}
     return [
-        Shown(mesh, MOVED if name in moved else PARTS[place(name) % len(PARTS)], labels[name])
+        Shown(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
         for name, mesh in turned.items()
     ]
 
@@ -138,7 +138,8 @@ def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trime
     length, radius = max(0.6 * size, 0.015), max(0.02 * size, 0.0008)
     shaft = trimesh.creation.cylinder(radius, 0.65 * length, sections=24)
     shaft.apply_translation([0, 0, 0.325 * length])
-    tip = trimesh.creation.cone(2.5 * radius, 0.35 * length, sections=24)
+    # So few facets are shaded one by one; smooth, the point would be black as if it faced away.
+    tip = trimesh.creation.cone(2.5 * radius, 0.35 * length, sections=8)
     tip.apply_translation([0, 0, 0.65 * length])
     whole = trimesh.util.concatenate([shaft, tip])
     turn = trimesh.geometry.align_vectors([0, 0, 1], along)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -10,12 +11,13 @@ from rich.console import Console
 
 from cell.config import CellConfig
 from cell.loading import load_product
+from cell.product import Product
 from experiments.plan.options import PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.evidence import evidence_text
-from planning.fixing.explain import explanation, step_table, step_text, stop_text
+from planning.fixing.explain import explanation, step_table, step_texts, stop_text
 from planning.fixing.plan_file import save_plan
 from planning.fixing.planner import FixingPlan, plan
 from planning.fixing.remark import bolt_remarks
@@ -54,21 +56,21 @@ def run_plan(
     Raises:
         CellError: The product or the order cannot be used; nothing is written.
     """
-    described = load_product(
-        product, options.units, densities=options.densities, group=options.group
-    )
-    fixing = plan(
-        described,
-        order,
-        tolerance=options.tolerance,
-        cache=options.cache,
-        slanted=options.slanted,
-    )
-    assert fixing.geometry is not None
+    described = _described(product, options)
     console = _console()
+    with console.status("Matrices, steps and orders ..."):
+        fixing = plan(
+            described,
+            order,
+            tolerance=options.tolerance,
+            cache=options.cache,
+            slanted=options.slanted,
+        )
+    assert fixing.geometry is not None
     _print_plan(console, fixing, explain)
     setup, started = Setup.of(config or CellConfig()), time.perf_counter()
-    choices = general_rule(described, fixing, setup)
+    with console.status("Ways to hold it, by the general rule ..."):
+        choices = general_rule(described, fixing, setup)
     seconds = {"general rule": time.perf_counter() - started}
     remarks = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
     out.mkdir(parents=True, exist_ok=True)
@@ -77,10 +79,18 @@ def run_plan(
     save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
     save_matrices(fixing, out / "matrices.npz")
     if html:
-        seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
+        with console.status(f"Pictures for {page.name} ..."):
+            seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
     _print_rule(console, choices, explain, remarks)
     _print_times(console, fixing, seconds)
     return 0 if fixing.feasible else 1
+
+
+def _described(product: str, options: PlanOptions) -> Product:
+    described = load_product(
+        product, options.units, densities=options.densities, group=options.group
+    )
+    return replace(described, up=options.up) if options.up else described
 
 
 def save_matrices(fixing: FixingPlan, file: Path) -> None:
@@ -103,8 +113,8 @@ def _console() -> Console:
 
 def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
     console.print(step_table(fixing))
-    lines = [explanation(fixing)] if explain else [step_text(step) for step in fixing.steps]
-    lines += [stop_text(fixing.stop)] if fixing.stop else []
+    lines = [explanation(fixing)] if explain else step_texts(fixing)
+    lines += [stop_text(fixing)] if fixing.stop else []
     lines += [advice_text(fixing.orders)] if fixing.orders else []
     lines += [evidence_text(fixing.evidence)] if fixing.evidence else []
     _print_lines(console, lines)

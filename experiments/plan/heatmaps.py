@@ -13,7 +13,8 @@ from matplotlib.figure import Figure
 
 from planning.fixing.directions import DIRECTIONS
 
-DPI = 100
+DPI = 130
+MARGIN = 0.9  # [inch] For the names beside a matrix.
 COLORS = ListedColormap(["#f4f6f8", "#3b6ea5", "#c9ced4"])  # 0, 1, and the diagonal.
 MOST_NAMES = 60  # More would be unreadable.
 
@@ -21,31 +22,35 @@ MOST_NAMES = 60  # More would be unreadable.
 def contact_map(parts: Sequence[str], contact: np.ndarray) -> bytes:
     """Return C + C^T as a PNG: which part touches which."""
     figure = Figure(figsize=(_size(parts) + 0.4, _size(parts)), dpi=DPI, layout="constrained")
-    _draw(figure.add_subplot(), parts, contact + contact.T, "", named=True)
+    axes, cell = figure.add_subplot(), (_size(parts) - MARGIN) / len(parts)
+    _draw(axes, parts, contact + contact.T, "", cell, named=True)
     return _png(figure)
 
 
 def direction_maps(parts: Sequence[str], matrices: Mapping[str, np.ndarray], symbol: str) -> bytes:
     """Return the six matrices of a kind as one PNG, two in each column of a direction's axis."""
     width = 2.4 * _size(parts) + 0.6
-    figure = Figure(figsize=(min(width, 13.0), min(1.7 * _size(parts), 9.0)), dpi=DPI,
-                    layout="constrained")  # fmt: skip
-    axes = figure.subplots(2, 3, squeeze=False)
+    height = min(1.7 * _size(parts), 9.0)
+    figure = Figure(figsize=(min(width, 13.0), height), dpi=DPI, layout="constrained")
+    axes, cell = figure.subplots(2, 3, squeeze=False), (height / 2 - MARGIN) / len(parts)
     for number, j in enumerate(DIRECTIONS):
         row, column = number % 2, number // 2
         named = column == 0
-        _draw(axes[row][column], parts, matrices[j], f"${symbol}_{{{j}}}$", named)
+        _draw(axes[row][column], parts, matrices[j], f"${symbol}_{{{j}}}$", cell, named)
     return _png(figure)
 
 
-def _draw(axes: Axes, parts: Sequence[str], matrix: np.ndarray, title: str, named: bool) -> None:
+def _draw(
+    axes: Axes, parts: Sequence[str], matrix: np.ndarray, title: str, cell: float, named: bool
+) -> None:
+    """Draw a matrix of 0 and 1; the names fit to its cells, so large [inch]."""
     cells = np.array(matrix, int)
     np.fill_diagonal(cells, 2)
     axes.imshow(cells, cmap=COLORS, vmin=0, vmax=2, interpolation="nearest")
     axes.set_title(title, fontsize=11)
     ticks = range(len(parts)) if len(parts) <= MOST_NAMES else []
     names = [parts[k] for k in ticks]
-    size = 9 if len(parts) <= 12 else 6 if len(parts) <= 30 else 4
+    size = float(np.clip(0.65 * 72 * cell, 4.0, 9.0))  # [pt]
     axes.set_xticks(ticks, names, rotation=90, fontsize=size)
     axes.set_yticks(ticks, names if named else [], fontsize=size)
     axes.tick_params(length=0)
@@ -59,7 +64,7 @@ def _draw(axes: Axes, parts: Sequence[str], matrix: np.ndarray, title: str, name
 
 def _size(parts: Sequence[str]) -> float:
     """Return the edge of one matrix [inch]."""
-    return float(np.clip(0.9 + 0.26 * len(parts), 1.8, 7.0))
+    return float(np.clip(MARGIN + 0.26 * len(parts), 1.8, 7.0))
 
 
 def _png(figure: Figure) -> bytes:

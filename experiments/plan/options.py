@@ -18,6 +18,7 @@ class PlanOptions:
         tolerance: Gap that still touches, and overlap that does not block [m].
         cache: Folder in which matrices are kept by content.
         slanted: Whether to look for ways out at an angle and for local freedom.
+        up: Axis that points up on the jig, "+x" ... "-z"; None for the product's.
     """
 
     units: str | None = None
@@ -26,3 +27,4 @@ class PlanOptions:
     tolerance: float | None = None
     cache: Path | None = None
     slanted: bool = False
+    up: str | None = None

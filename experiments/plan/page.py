@@ -18,9 +18,10 @@ from experiments.reporting.render import rendering_problem
 from planning.fixing.algorithm import READING
 from planning.fixing.directions import opposite
 from planning.fixing.evidence import evidence_text
-from planning.fixing.explain import blocker_text, step_text, stop_text
+from planning.fixing.explain import blocker_text, step_texts, stop_text
+from planning.fixing.order import together
 from planning.fixing.planner import FixingPlan
-from planning.holding.candidate import Candidate, Choice, Setup
+from planning.holding.candidate import CRITERIA, Candidate, Choice, Setup
 from planning.holding.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.explain import advice_text, arrow_text
@@ -67,13 +68,13 @@ def write_page(
 def _summary(plan: FixingPlan, notes: Sequence[str]) -> str:
     facts = {
         "order": ", ".join(plan.order),
-        "parts": len(plan.parts),
+        "parts": f"{len(plan.parts)}",
         "up on the jig": plan.steps[0].up if plan.steps else "",
-        "planned in [s]": round(plan.seconds, 3),
+        "planned in": f"{plan.seconds:.3f} s",
     }
     verdict = "success" if plan.feasible else "failure"
     words = "feasible" if plan.feasible else "infeasible"
-    stop = f"<pre>{escape(stop_text(plan.stop))}</pre>" if plan.stop else ""
+    stop = f"<pre>{escape(stop_text(plan))}</pre>" if plan.stop else ""
     paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
     return (
         f"<h1>{escape(plan.product)}: plan</h1>\n"
@@ -96,7 +97,9 @@ def _orders(advice: OrderAdvice | None) -> str:
 def _steps(
     product: Product, plan: FixingPlan, choices: Sequence[Choice], setup: Setup, pictured: bool
 ) -> str:
-    parts = [f"<p>{escape(READING)}</p>"]
+    scores = f"<details><summary>What the scores mean</summary>{pairs(CRITERIA)}</details>"
+    parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
+    reasons = step_texts(plan)
     for number, step in enumerate(plan.steps):
         choice = choices[number] if number < len(choices) else None
         parts.append(f"<h3>{number + 1}. {escape(step.item)}</h3>")
@@ -104,7 +107,7 @@ def _steps(
             parts.append(_picture(product, plan, number, choice, setup))
         parts.append(
             f"<p><b>Algorithm 1: {escape(step.posture)} / {escape(step.fixed_part)}.</b> "
-            f"{escape(step_text(step).strip())}</p>"
+            f"{escape(reasons[number].strip())}</p>"
         )
         parts.append(_choice(choice) if choice else "")
     if pictured and len(plan.steps) > MOST_STEPS_PICTURED:
@@ -119,13 +122,17 @@ def _picture(
     figured = choice.candidates[choice.paper].figures if choice else {}
     depth = figured.get("depth_m", USUAL_DEPTH)
     shown = step_arrangement(product, step, setup.jig.bag, depth)
-    sides = [step.item, " + ".join(plan.order[: number + 1])]
+    sides = [step.item, together(plan.order[: number + 1])]
     moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
     return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
 
 
 def _exploded(product: Product, plan: FixingPlan) -> str:
-    return _figure(exploded(product, plan.steps), "Drawn apart") if plan.steps else ""
+    return (
+        _figure(exploded(product, plan.steps), "Each item moved out the way it comes in")
+        if plan.steps
+        else ""
+    )
 
 
 def _figure(shown: Sequence[Shown], caption: str) -> str:
@@ -137,29 +144,35 @@ def _choice(choice: Choice) -> str:
     passed = [_row(number, c, choice) for number, c in enumerate(choice.candidates, start=1)
               if not c.rejected]  # fmt: skip
     rejected = [c for c in choice.candidates if c.rejected]
-    reasons = "".join(
-        f"<li>{escape(c.label)}{_by_paper(choice, c)}: {escape(c.rejected)}</li>" for c in rejected
-    )
+    notes = [(c, note) for c in choice.candidates for note in c.notes]
     kind = "agree" if choice.agrees else "differ"
     return (
         f'<p class="{kind}"><b>General rule:</b> {escape(choice.verdict)}</p>'
         f"{table(passed, list(passed[0])) if passed else ''}"
-        f"<details><summary>{len(rejected)} rejected</summary><ul>{reasons}</ul></details>"
+        f"{_about(choice, notes)}<details><summary>{len(rejected)} rejected</summary>"
+        f"{_about(choice, [(c, c.rejected) for c in rejected])}</details>"
     )
+
+
+def _about(choice: Choice, remarks: Sequence[tuple[Candidate, str]]) -> str:
+    lines = "".join(
+        f"<li>{escape(c.label + _by_paper(choice, c))}: {escape(text)}</li>" for c, text in remarks
+    )
+    return f"<ul>{lines}</ul>" if lines else ""
 
 
 def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]:
     return {
         "": number,
-        "on the jig": candidate.label + _by_paper(choice, candidate),
-        "from": candidate.approach,
-        "score": round(candidate.score, 2),
-        **{name: round(value, 2) for name, value in candidate.scores.items()},
+        "on the jig": candidate.name + _by_paper(choice, candidate),
+        "up": candidate.up,
+        "from": candidate.approach.removeprefix("the "),
+        "score": f"{candidate.score:.2f}",
+        **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
         "bears / pushed across [N]": (
             f"{candidate.figures['bears_across_N']:.1f} / "
             f"{candidate.figures['pushed_across_N']:.1f}"
         ),
-        "to provide for": "; ".join(candidate.notes),
     }
 
 

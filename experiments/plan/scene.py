@@ -62,7 +62,8 @@ def picture(shown: Sequence[Shown]) -> tuple[bytes, View]:
         scene_graph.RegisterAnchoredGeometry(source, _geometry(item, number))
     diagram = builder.Build()
     view = view_of(item.mesh for item in shown if item.frame)
-    return take_picture(scene_graph, diagram.CreateDefaultContext(), view), view
+    context = diagram.CreateDefaultContext()
+    return take_picture(scene_graph, context, view, shadows=False), view
 
 
 def _geometry(item: Shown, number: int) -> GeometryInstance:

@@ -76,13 +76,16 @@ CELL_VIEW = View(p_WC=(0.8, 1.9, 1.25), p_WTarget=(0.0, 0.05, 0.25))
 JIG_VIEW = View(p_WC=(0.25, 0.6, 0.42), p_WTarget=(0.0, 0.15, 0.25))
 
 
-def take_picture(scene_graph: SceneGraph, root: Context, view: View) -> bytes:
+def take_picture(
+    scene_graph: SceneGraph, root: Context, view: View, *, shadows: bool = True
+) -> bytes:
     """Return a PNG of the scene in its present state, which is left as it was.
 
     Args:
         scene_graph: Whose geometries with the perception role are seen.
         root: Context of the diagram that the scene graph is in.
         view: The camera.
+        shadows: Whether things throw shadows; they have jagged edges on what is seen closely.
 
     Raises:
         NoRendering: Where `rendering_problem` has a reason.
@@ -90,7 +93,7 @@ def take_picture(scene_graph: SceneGraph, root: Context, view: View) -> bytes:
     if reason := rendering_problem():
         raise NoRendering(reason)
     context = scene_graph.GetMyMutableContextFromRoot(root)
-    scene_graph.AddRenderer(context, RENDERER, MakeRenderEngineVtk(_engine_parameters()))
+    scene_graph.AddRenderer(context, RENDERER, MakeRenderEngineVtk(_engine_parameters(shadows)))
     # Else the new renderer gets no poses where they were computed before it came.
     context.SetAllCacheEntriesOutOfDate()
     try:
@@ -108,7 +111,7 @@ def png(pixels: np.ndarray) -> bytes:
     return buffer.getvalue()
 
 
-def _engine_parameters() -> RenderEngineVtkParams:
+def _engine_parameters(shadows: bool) -> RenderEngineVtkParams:
     """Return a lamp above, a weaker one across, and a little light at the camera."""
     lamps = [
         LightParameter(type="directional", frame=frame, direction=direction, intensity=intensity)
@@ -121,7 +124,7 @@ def _engine_parameters() -> RenderEngineVtkParams:
     return RenderEngineVtkParams(
         default_clear_color=[0.93, 0.94, 0.96],
         lights=lamps,
-        cast_shadows=True,
+        cast_shadows=shadows,
         shadow_map_size=1024,
     )
 

@@ -33,11 +33,11 @@ from planning.fixing.solids import Solid, cog_height
 
 READING = (
     "A_j = 1: the incoming part leaves the target along j (column reading of W_j). Posture: the "
-    "direction in which the incoming part lies relative to the target, not an orientation; `up` "
-    "of the product points up throughout. Posture along `up`: the target is at the bottom and its "
-    "fixed part stays; against `up`: the incoming part is at the bottom and is fixed; across: the "
-    "target stays fixed. Two or more 1s: the direction (along `up` if there is one) that, turned "
-    "up, has the combined centre of gravity lowest."
+    "direction in which the incoming part lies relative to the target, not an orientation: the "
+    "product's up axis points up throughout. Posture along that axis: the target is at the bottom "
+    "and its fixed part stays; against it: the incoming part is at the bottom and is fixed; across "
+    "it: the target stays fixed. Two or more 1s: the direction (one along that axis if there is "
+    "any) that, turned up, has the combined centre of gravity lowest."
 )
 
 SAME_HEIGHT = 1e-6  # [m] Centres of gravity this close are equal: below any drawing's tolerance.

@@ -60,7 +60,7 @@ def without_overlaps(
         bolt, nut = _declared(product, a, b, depth, tolerance) or _recognised(thread)
         if not bolt:
             raise CellError(
-                f"Parts '{a}' and '{b}' overlap by {1e3 * depth:.3g} mm, more than the "
+                f"Parts '{a}' and '{b}' overlap by about {1e3 * depth:.3g} mm, more than the "
                 f"contact tolerance of {1e3 * tolerance:.3g} mm, and not as a bolt does in its "
                 "thread: correct their poses or shapes, or raise the tolerance."
             )

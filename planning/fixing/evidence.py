@@ -104,7 +104,7 @@ def evidence_of(
         product.contact_tolerance == matrices.tolerance,
         matrices.threads,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
-        (*product.remarks, *_doubts(matrices)),
+        (*product.remarks, *_doubts(product.items(), matrices)),
         tuple(_motions(matrices, steps)) if slanted else (),
     )
 
@@ -120,14 +120,16 @@ def _motions(matrices: Matrices, steps: Sequence[FixingStep | Stop]) -> Iterator
             yield Motion(step.item, freedom)
 
 
-def _doubts(matrices: Matrices) -> list[str]:
+def _doubts(items: Sequence[str], matrices: Matrices) -> list[str]:
     """Return what a careful person would ask about."""
     names = list(matrices.solids)
-    if len(names) == 1:
-        return [f"'{names[0]}' is the only part: there is nothing to assemble"]
+    if len(items) == 1:
+        kind = "part" if len(names) == 1 else "item"
+        return [f"'{items[0]}' is the only {kind}: there is nothing to assemble"]
     touching = matrices.contact + matrices.contact.T
     alone = [name for name, row in zip(names, touching, strict=True) if not row.any()]
-    return [f"{', '.join(alone)} touches no other part"] if alone else []
+    touch = "touches" if len(alone) == 1 else "touch"
+    return [f"{', '.join(alone)} {touch} no other part"] if alone else []
 
 
 def _fragile_contacts(matrices: Matrices, places: Places) -> list[Fragile]:

@@ -7,9 +7,10 @@ from collections.abc import Iterable
 import numpy as np
 from rich.table import Table
 
-from planning.fixing.algorithm import READING, FixingStep, Stop
+from planning.fixing.algorithm import READING, FixingStep
 from planning.fixing.directions import DIRECTIONS, open_directions
 from planning.fixing.interference import Blocker
+from planning.fixing.order import together
 from planning.fixing.planner import FixingPlan
 from planning.ordering.explain import precedence_text
 
@@ -31,9 +32,12 @@ def _step_cells(step: FixingStep) -> list[str]:
     return [step.item, *digits, chosen, step.up, f"{1e3 * step.cog_height:.1f}"]
 
 
-def stop_text(stop: Stop) -> str:
-    """Return why Algorithm 1 stopped, with the evidence for each direction."""
-    lines = [f"Infeasible: {stop.item} cannot be added to {', '.join(stop.target)}: {stop.reason}."]
+def stop_text(plan: FixingPlan) -> str:
+    """Return why Algorithm 1 stopped, with the evidence for each direction; "" if it did not."""
+    if plan.stop is None:
+        return ""
+    stop, target = plan.stop, together(plan.order[: len(plan.steps) + 1])
+    lines = [f"Infeasible: {stop.item} cannot be added to {target}: {stop.reason}."]
     return "\n".join(lines + [f"  {blocker_text(blocker)}" for blocker in stop.blockers])
 
 
@@ -55,7 +59,7 @@ def explanation(plan: FixingPlan) -> str:
         "Reachable W_j = (C + C^T) * M_j",
         *(f"W_{j}:\n" + matrix_text(plan.parts, plan.reachable[j]) for j in DIRECTIONS),
         *([precedence_text(plan.orders)] if plan.orders and plan.orders.ranked else []),
-        "Steps:\n" + "\n".join(step_text(step) for step in plan.steps),
+        "Steps:\n" + "\n".join(step_texts(plan)),
         "Reading: " + READING,
         "Blocked, with a point of the part that stays, in the product frame:\n"
         + "\n".join("  " + blocker_text(blocker) for blocker in _sorted(plan)),
@@ -63,10 +67,13 @@ def explanation(plan: FixingPlan) -> str:
     return "\n\n".join(sections)
 
 
-def step_text(step: FixingStep) -> str:
-    """Return one step's A list and reason."""
-    leaves = ", ".join(open_directions(step.directions))
-    return f"  A({' + '.join(step.target)}; {step.item}): {leaves}. {step.reason}"
+def step_texts(plan: FixingPlan) -> list[str]:
+    """Return each step's A list and reason."""
+    return [
+        f"  A({together(plan.order[: number + 1])}; {step.item}): "
+        f"{', '.join(open_directions(step.directions))}. {step.reason}"
+        for number, step in enumerate(plan.steps)
+    ]
 
 
 def matrix_text(names: Iterable[str], matrix: np.ndarray) -> str:

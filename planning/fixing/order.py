@@ -1,11 +1,21 @@
-"""The check of an assembly order against the product."""
+"""An assembly order: checked against the product, and what is there of it as words."""
 
 from __future__ import annotations
 
 from collections import Counter
+from collections.abc import Sequence
 
 from cell.errors import BadOrder
 from cell.product import Product
+
+MOST_NAMED = 6  # More would hide the sentence that they are in.
+
+
+def together(names: Sequence[str]) -> str:
+    """Return a sub-assembly as words: all of its names, or the first and how many more."""
+    if len(names) <= MOST_NAMED:
+        return " + ".join(names)
+    return f"{names[0]} + {len(names) - 1} others"
 
 
 def check_order(product: Product, order: tuple[str, ...]) -> None:

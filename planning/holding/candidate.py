@@ -8,6 +8,19 @@ from dataclasses import dataclass
 from cell.config import CellConfig
 from cell.soft_jig import JigParameters
 
+CRITERIA: Mapping[str, str] = {
+    "reach": "1 if the moved part comes from above, 1/2 from the side",
+    "stability": "angle by which the centre of gravity could lean, of 90 degrees; the lower of the "
+    "body alone and with the moved part on it",
+    "footprint": "share of the bag's diameter that is left beside the footprint",
+    "imprint": "share of the bag's depth that is left below the body",
+    "holding": "m / (1 + m), m: force it bears across, per force that the operation exerts across",
+    "gripper": "share of the gripper's stroke that is left over the widest of what must be "
+    "gripped; 0 also for jaws made wider than it",
+    "continuity": "1 if the jig holds the body in this posture already, or holds nothing yet",
+}
+"""What the scores of a candidate mean, each from 0 to 1."""
+
 
 @dataclass(frozen=True)
 class Setup:

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
-from planning.holding.candidate import Candidate, Choice
+from planning.holding.candidate import CRITERIA, Candidate, Choice
 
 
 def choices_to_list(choices: Sequence[Choice]) -> list[dict[str, Any]]:
@@ -34,10 +34,11 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 
 def choices_text(choices: Sequence[Choice]) -> str:
     """Return every candidate with its score or the reason against it."""
-    return "\n".join(
-        "\n".join([f"  {choice.item}: {choice.verdict}", *map(_line, choice.candidates)])
-        for choice in choices
-    )
+    meaning = "; ".join(f"{name}: {text}" for name, text in CRITERIA.items())
+    lines = [f"  Scores from 0 to 1: {meaning}."]
+    for choice in choices:
+        lines += [f"  {choice.item}: {choice.verdict}", *map(_line, choice.candidates)]
+    return "\n".join(lines)
 
 
 def _line(candidate: Candidate) -> str:

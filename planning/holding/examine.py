@@ -96,6 +96,7 @@ class Examiner:
         R_JA = posture(trial.up)
         width = self._grip(trial, R_JA, figures)
         diameter = self._footprint(trial, R_JA, figures)
+        self._check_balance(trial)
         imprint = self._imprint(trial, R_JA, figures)
         self._check_clear_of_bed(trial, R_JA, approach, imprint, notes)
         lean = self._lean(trial, R_JA, imprint, figures)
@@ -125,12 +126,9 @@ class Examiner:
         bodies = self.gravity.components(trial.moved) + ([] if trial.held else [trial.body])
         widths = []
         for parts in bodies:
-            width, possible = self.gripper.width(parts, R_JA)
-            if not possible:
-                raise Rejected(
-                    f"no way to grip {_listed(parts)} in this posture: {1e3 * width:.0f} mm "
-                    f"across; the gripper opens {1e3 * STROKE:.0f} mm and cannot come from below"
-                )
+            width, obstacle = self.gripper.width(parts, R_JA)
+            if obstacle:
+                raise Rejected(f"no way to grip {_listed(parts)} in this posture: {obstacle}")
             widths.append(width)
         figures["grip_width_m"] = max(widths)
         return max(widths)
@@ -147,6 +145,16 @@ class Examiner:
                 f"its footprint needs {1e3 * diameter:.1f} mm, the bag has {1e3 * aperture:.1f} mm"
             )
         return diameter
+
+    def _check_balance(self, trial: Trial) -> None:
+        """What is assembled beyond the body's own box tips it, however it stands in the bed."""
+        solids = [self.geometry.solids[name] for name in trial.body]
+        low = np.min([solid.lower for solid in solids], axis=0)
+        high = np.max([solid.upper for solid in solids], axis=0)
+        p_G = combined_cog(self.geometry.solids, trial.body + trial.moved)
+        beyond = np.delete(np.maximum(low - p_G, p_G - high), axis_index(trial.up)).max()
+        if beyond > 0.0:
+            raise Rejected(f"the common centre of gravity is {1e3 * beyond:.1f} mm beside it")
 
     def _imprint(self, trial: Trial, R_JA: np.ndarray, figures: dict[str, float]) -> Imprint:
         """Press the body into the bed; what is added far above the bed changes nothing."""

@@ -61,8 +61,8 @@ class Gravity:
         blocked = self.geometry.interference.free[opposite(up)][np.ix_(at, at)] == 0
         np.fill_diagonal(blocked, False)
         rests_on = blocked | self._fastened(body)
-        for _ in body:
-            stays = stays | rests_on[:, stays].any(axis=1)
+        while (more := rests_on[:, stays].any(axis=1) & ~stays).any():
+            stays = stays | more
         return [name for name, kept in zip(body, stays, strict=True) if not kept]
 
     def _fastened(self, body: Sequence[str]) -> np.ndarray:

@@ -3,18 +3,8 @@
 Algorithm 1 asks what can reach what, and for a low centre of gravity. A user wants to know more: so
 beside it every step's candidates are looked at one by one. The body on the jig is the target or the
 incoming item, and each of the six axes of the product may point up. A candidate that fails a test
-is rejected with the reason; the others are scored from 0 to 1 by
-
-    reach      1 if the moved part comes from above, 1/2 from the side
-    stability  angle by which the centre of gravity could lean, of 90 degrees; the lower of the body
-               alone and with the moved part on it
-    footprint  share of the bag's diameter that is left beside the footprint
-    imprint    share of the bag's depth that is left below the body
-    holding    m / (1 + m), m: force it bears across, per force that the operation exerts across
-    gripper    share of the gripper's stroke that is left over the widest of what must be gripped
-    continuity 1 if the jig holds the body in this posture already, or holds nothing yet
-
-and ranked by the mean. Equal weights: no source says otherwise, and the table shows them all.
+is rejected with the reason; the others are scored from 0 to 1 by ``CRITERIA`` and ranked by the
+mean. Equal weights: no source says otherwise, and the table shows them all.
 """
 
 from __future__ import annotations
@@ -24,6 +14,7 @@ from collections.abc import Sequence
 from cell.product import Product
 from planning.fixing.algorithm import FixingStep
 from planning.fixing.directions import DIRECTIONS, open_directions, opposite
+from planning.fixing.order import together
 from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import Candidate, Choice, Setup
 from planning.holding.examine import Examiner, Trial
@@ -48,15 +39,21 @@ def general_rule(product: Product, fixing: FixingPlan, setup: Setup) -> tuple[Ch
 
 def _choice(examiner: Examiner, step: FixingStep, there: tuple[str, ...]) -> Choice:
     """Weigh the candidates of one step, before which some items of the order are there."""
-    bare, together = len(there) == 1, " + ".join(there)
+    bare, assembled = len(there) == 1, together(there)
     leaving = open_directions(step.directions)
     arriving = [opposite(j) for j in leaving]
     trials = [
         Trial(
-            name, body, moved, directions, up, not bare and name == together and up == step.up, bare
+            name,
+            body,
+            moved,
+            directions,
+            up,
+            not bare and name == assembled and up == step.up,
+            bare,
         )
         for name, body, moved, directions in (
-            (together, step.target, step.incoming, leaving),
+            (assembled, step.target, step.incoming, leaving),
             (step.item, step.incoming, step.target, arriving),
         )
         for up in DIRECTIONS

@@ -47,14 +47,22 @@ class Items:
 
     def connected(self, items: int) -> bool:
         """Say whether a set hangs together through contacts."""
-        reached = grown = items & -items
-        while grown:
+        return self._linked(items, items)
+
+    def connected_without(self, item: int, rest: int) -> bool:
+        """Say whether the rest of a set that hangs together does so without an item."""
+        return self._linked(self.touching[item] & rest, rest)
+
+    def _linked(self, some: int, items: int) -> bool:
+        """Say whether contacts within a set link some of its items with each other."""
+        reached = grown = some & -some
+        while grown and some & ~reached:
             near = 0
             for item in members(grown):
                 near |= self.touching[item]
             grown = near & items & ~reached
             reached |= grown
-        return reached == items
+        return not some & ~reached
 
     def listed(self, items: int) -> tuple[str, ...]:
         """Return the names in a set."""
@@ -105,7 +113,8 @@ def items_of(
 
 def _rows(member: np.ndarray, relation: np.ndarray) -> tuple[int, ...]:
     """Return, per item, the set of other items that any of its parts is related to."""
-    related = member.astype(int) @ relation.astype(int) @ member.T.astype(int) > 0
+    chosen = member.astype(float)  # Whole numbers are exact, and far faster to multiply than int.
+    related = chosen @ relation.astype(float) @ chosen.T > 0
     np.fill_diagonal(related, False)
     return tuple(as_set(np.flatnonzero(row).tolist()) for row in related)
 

@@ -25,7 +25,7 @@ from planning.fixing.algorithm import choose_posture
 from planning.fixing.directions import opposite
 from planning.fixing.solids import Solid
 from planning.holding.footprint import USUAL_DEPTH, Footprint, footprint, posture, standing_points
-from planning.holding.imprint import press, samples_of
+from planning.holding.imprint import Surface, press, samples_of
 from planning.ordering.items import Items, as_set, members
 from planning.ordering.search import Cost
 
@@ -56,6 +56,7 @@ class Objective:
     _stages: dict[int, tuple[int, int]] = field(default_factory=dict)
     _outlines: dict[int, Footprint | None] = field(default_factory=dict)
     _bearing: dict[int, Footprint | None] = field(default_factory=dict)
+    _surfaces: dict[str, Surface] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Sum up each item along ``up``."""
@@ -130,6 +131,11 @@ class Objective:
         """Return what bears, in the plane of the turned product, when a set is pressed in."""
         numbers = list(members(reaching))
         middle = self._cog(numbers)[:2]
-        parts = [samples_of(self.solids[name]) for i in numbers for name in self.parts[i]]
+        parts = [self._surface(name) for i in numbers for name in self.parts[i]]
         outline = press(parts, self._R_JA, middle, self.jig, self.press_force).contact
         return None if outline is None else outline.shifted(middle)
+
+    def _surface(self, name: str) -> Surface:
+        if name not in self._surfaces:
+            self._surfaces[name] = samples_of(self.solids[name])
+        return self._surfaces[name]

@@ -37,35 +37,34 @@ class Precedence:
 
 def precedences(items: Items, first: int) -> tuple[Precedence, ...]:
     """Return the arrows that do not follow from others, for orders that begin with an item."""
-    blocked, unreached = {}, {}
-    for k in range(len(items.names)):
-        if k != first:
-            blocked[k] = locked_core(items, kept=1 << k | 1 << first) & ~(1 << k | 1 << first)
-            unreached[k] = _only_through(items, first, k)
-    before = {k: blocked[k] | unreached[k] for k in blocked}
+    others = [k for k in range(len(items.names)) if k != first]
+    blocked = {k: _has_to_be_there(items, first, k) for k in others}
+    cut_off = {i: items.everything & ~_reached(items, first, without=i) for i in others}
+    before = {
+        k: blocked[k] | as_set(i for i in others if i != k and cut_off[i] >> k & 1) for k in others
+    }
+    full = _closure(before)
     return tuple(
         Precedence(items.names[i], items.names[k], "blocking" if blocked[k] >> i & 1 else "contact")
         for k in before
-        for i in members(_direct(k, _closure(before)))
+        for i in members(_direct(k, full))
     )
 
 
-def _only_through(items: Items, first: int, last: int) -> int:
-    """Return the items that lie on every chain of contacts between two items."""
-    return as_set(
-        i
-        for i in range(len(items.names))
-        if i not in (first, last) and not _reaches(items, first, last, without=i)
-    )
+def _has_to_be_there(items: Items, first: int, k: int) -> int:
+    """Return the items that cannot leave while the first one and k are there."""
+    both = 1 << k | 1 << first
+    return locked_core(items, kept=both) & ~both
 
 
-def _reaches(items: Items, first: int, last: int, without: int) -> bool:
+def _reached(items: Items, first: int, without: int) -> int:
+    """Return the items that chains of contacts from the first one lead to, past one of them."""
     reached = grown = 1 << first
-    while grown and not reached >> last & 1:
+    while grown:
         near = _union(items.touching[i] for i in members(grown))
         grown = near & ~reached & ~(1 << without)
         reached |= grown
-    return bool(reached >> last & 1)
+    return reached
 
 
 def _closure(before: dict[int, int]) -> dict[int, int]:

@@ -13,7 +13,7 @@ sets of a layer go on, and the answer says that it is the best found, not the be
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 
 from planning.ordering.items import Items, members
@@ -61,12 +61,14 @@ def best_orders(items: Items, cost: StepCost, keep: int = 1) -> Found:
     layer: dict[int, list[Partial]] = {items.everything: [((), ())]}
     exact, sets, width = True, 1, layer_width(items)
     for _ in items.names[1:]:
-        layer = _taken_apart(items, layer, cost, keep)
-        sets += len(layer)
-        if len(layer) > width:
-            exact = False
-            cheapest = sorted(layer, key=lambda key: (layer[key][0][0], key))[:width]
-            layer = {key: layer[key] for key in cheapest}
+        steps = _taken_apart(items, layer, cost)
+        sets += len(steps)
+        exact = exact and len(steps) <= width
+        cheapest = sorted(steps, key=lambda rest: (min(_totals(layer, rest, steps[rest])), rest))
+        layer = {
+            rest: _distinct(items, _ways(layer, rest, steps[rest]), keep)
+            for rest in cheapest[:width]
+        }
     finished = [
         (_sum(cost(0, item), spent), (item, *order))
         for rest, ways in layer.items()
@@ -81,20 +83,37 @@ def best_orders(items: Items, cost: StepCost, keep: int = 1) -> Found:
 
 
 def _taken_apart(
-    items: Items, layer: dict[int, list[Partial]], cost: StepCost, keep: int
-) -> dict[int, list[Partial]]:
-    """Return the sets that are left when one item is taken off, with the cheapest ways to them."""
-    found: dict[int, list[Partial]] = {}
-    for whole, ways in layer.items():
+    items: Items, layer: Mapping[int, list[Partial]], cost: StepCost
+) -> dict[int, list[tuple[Cost, int]]]:
+    """Return the sets that are left when an item is taken off, with the step's cost and item."""
+    found: dict[int, list[tuple[Cost, int]]] = {}
+    for whole in layer:
         for item in members(whole):
             rest = whole ^ (1 << item)
-            if not items.leaves(item, rest) or not (rest in found or items.connected(rest)):
+            if not items.leaves(item, rest):
                 continue
-            spent = cost(rest, item)
-            found.setdefault(rest, []).extend(
-                (_sum(spent, before), (item, *order)) for before, order in ways
-            )
-    return {rest: _distinct(items, ways, keep) for rest, ways in found.items()}
+            if not (rest in found or items.connected_without(item, rest)):
+                continue
+            found.setdefault(rest, []).append((cost(rest, item), item))
+    return found
+
+
+def _totals(
+    layer: Mapping[int, list[Partial]], rest: int, steps: list[tuple[Cost, int]]
+) -> Iterator[Cost]:
+    """Yield, per step to a set, the cost of the cheapest way that ends with it."""
+    return (_sum(spent, layer[rest | 1 << item][0][0]) for spent, item in steps)
+
+
+def _ways(
+    layer: Mapping[int, list[Partial]], rest: int, steps: list[tuple[Cost, int]]
+) -> list[Partial]:
+    """Return all the ways to a set."""
+    return [
+        (_sum(spent, before), (item, *order))
+        for spent, item in steps
+        for before, order in layer[rest | 1 << item]
+    ]
 
 
 def _distinct(items: Items, ways: list[Partial], keep: int) -> list[Partial]:
@@ -128,7 +147,9 @@ def any_order(items: Items) -> tuple[int, ...] | None:
         rest = whole ^ (1 << item)
         if rest == 0 and items.whole[item]:
             return (item, *reversed(taken))
-        if rest in tried or not rest or not items.leaves(item, rest) or not items.connected(rest):
+        if rest in tried or not rest or not items.leaves(item, rest):
+            continue
+        if not items.connected_without(item, rest):
             continue
         tried.add(rest)
         if len(tried) > MOST_SETS:

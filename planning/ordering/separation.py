@@ -50,12 +50,13 @@ def locked_core(items: Items, kept: int = 0) -> int:
         items: The items.
         kept: Set of items that are not taken off.
     """
-    core = items.everything
-    while True:
-        free = as_set(i for i in members(core & ~kept) if items.leaves(i, core ^ (1 << i)))
-        if not free or core == core & -core:
-            return core
-        core ^= free & -free
+    core, before = items.everything, 0
+    while core != before:
+        before = core
+        for i in members(before & ~kept):
+            if core != 1 << i and items.leaves(i, core ^ (1 << i)):
+                core ^= 1 << i
+    return core
 
 
 def find_interlock(items: Items) -> Interlock | None:

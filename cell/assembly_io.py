@@ -1,7 +1,7 @@
-"""STEP assemblies at the door: names, instances and units as in the file, faces as triangles.
+"""Assemblies in one file, STEP or glTF: names, instances and units as in the file, as triangles.
 
-OpenCASCADE reads them, through ``cascadio``; what it hands over is in metres by the specification
-of glTF, whatever the unit of the file.
+OpenCASCADE reads STEP, through ``cascadio``; what it hands over is glTF, in metres by its
+specification, whatever the unit of the file.
 """
 
 from __future__ import annotations
@@ -18,7 +18,8 @@ import trimesh
 from cell.errors import CellError
 from cell.mesh_io import check_mesh, joined
 
-STEP_SUFFIXES = (".step", ".stp")
+GLTF_SUFFIX = ".glb"
+ASSEMBLY_SUFFIXES = (".step", ".stp", GLTF_SUFFIX)
 
 DEFLECTION = 0.005  # [mm] [D] A tenth of the usual tolerance on fits.
 FACET_ANGLE = 0.1  # [rad] [D] 63 facets a turn: 7 um of sagitta on a hole of 12 mm.
@@ -27,8 +28,8 @@ FACET_ANGLE = 0.1  # [rad] [D] 63 facets a turn: 7 um of sagitta on a hole of 12
 NAMELESS = re.compile(r"NAUO\d*|=>\[.*\]|\d*|Solid\d*|Open CASCADE.*", re.IGNORECASE)
 
 
-def load_step(file: Path) -> dict[str, trimesh.Trimesh]:
-    """Read every solid of a STEP file, in its assembled pose [m], by the name of its instance.
+def load_assembly(file: Path) -> dict[str, trimesh.Trimesh]:
+    """Read every solid of a file, in its assembled pose [m], by the name of its instance.
 
     An instance without a name has that of its product; the second of two with one name gets a
     number. Names keep their letters and digits; all else becomes "_", so that they can be listed in
@@ -59,11 +60,16 @@ def _scene(file: Path) -> trimesh.Scene:
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise CellError(f"STEP file '{file}' cannot be read: {error.strerror}.") from error
-    binary = _converted(data)
-    if not binary:
+        raise CellError(f"'{file}' cannot be read: {error.strerror}.") from error
+    binary = data
+    if file.suffix.lower() != GLTF_SUFFIX and not (binary := _converted(data)):
         raise CellError(f"'{file}' is not a STEP file that can be read.")
-    scene = trimesh.load_scene(io.BytesIO(binary), file_type="glb", process=False)
+    try:
+        scene = trimesh.load_scene(
+            io.BytesIO(binary), file_type="glb", process=False, merge_primitives=True
+        )
+    except Exception as error:  # The reader raises whatever it likes, in its own words.
+        raise CellError(f"'{file}' is not a glTF file that can be read.") from error
     if not scene.geometry:
         raise CellError(f"'{file}' holds no solid.")
     return scene
