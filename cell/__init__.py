@@ -1,4 +1,18 @@
-"""What exists: products, arms, tools, soft jig, threads and sensors as one Drake diagram."""
+"""What exists: products, arms, tools, soft jig, threads and sensors as one Drake diagram.
+
+What is named in `__all__` is for users. The folders are its rooms, from the lowest up:
+
+- `soft_jig`: the bag of beads, soft and frozen.
+- `settings`: the configuration.
+- `products`: what is assembled, and reading it from files.
+- `cad`: geometry of the models, ``python -m cell.cad``.
+- `workpieces`: a product's parts and threads in the plant.
+- `machines`: arms, tools, the jig's base, sensors.
+- `running`: the cell as one diagram, phases, simulation, log, saved states.
+- `trial`: one part on the jig, and the rig that pushes it.
+
+A test keeps their imports pointing down; `errors` and `paths` are for all of them.
+"""
 
 from __future__ import annotations
 
@@ -6,11 +20,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from cell.builder import Cell, add_cell, build_cell
-    from cell.config import CellConfig
-    from cell.loading import load_product
-    from cell.product import Product
-    from cell.simulation import Simulation
+    from cell.products.loading import load_product
+    from cell.products.product import Product
+    from cell.running.builder import Cell, add_cell, build_cell
+    from cell.running.simulation import Simulation
+    from cell.settings.config import CellConfig
 
 __all__ = [
     "Cell",
@@ -24,13 +38,13 @@ __all__ = [
 
 # Looked up on first use: Drake takes a second that `cell.errors` and `--help` can do without.
 _HOME = {
-    "Cell": "cell.builder",
-    "CellConfig": "cell.config",
-    "Product": "cell.product",
-    "Simulation": "cell.simulation",
-    "add_cell": "cell.builder",
-    "build_cell": "cell.builder",
-    "load_product": "cell.loading",
+    "Cell": "cell.running.builder",
+    "CellConfig": "cell.settings.config",
+    "Product": "cell.products.product",
+    "Simulation": "cell.running.simulation",
+    "add_cell": "cell.running.builder",
+    "build_cell": "cell.running.builder",
+    "load_product": "cell.products.loading",
 }
 
 

@@ -26,9 +26,9 @@ from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.table import Table
 
-from cell.config import CellConfig
-from cell.loading import load_product
-from cell.product import Part, Product
+from cell.products.loading import load_product
+from cell.products.product import Part, Product
+from cell.settings.config import CellConfig
 from planning.fixing.cache import cached_matrices
 from planning.fixing.contact import gap_matrix
 from planning.fixing.matrices import matrices_of

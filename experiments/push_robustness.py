@@ -29,9 +29,9 @@ from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
-from cell.config import CellConfig
 from cell.errors import CellError
-from cell.loading import load_product
+from cell.products.loading import load_product
+from cell.settings.config import CellConfig
 from experiments.cli.common import BadUsage, Common
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases

@@ -22,7 +22,7 @@ from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.errors import CellError
-from cell.loading import load_product
+from cell.products.loading import load_product
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
 from experiments.metrics.criteria import LIMITS, Limit

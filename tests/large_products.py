@@ -5,7 +5,7 @@ from __future__ import annotations
 from manifold3d import Manifold
 from tiny_products import box, product_of
 
-from cell.product import Product
+from cell.products.product import Product
 
 PITCH = 6.0  # Height of a layer: a plate of 4 and a gap of 2 that its pin lies in.
 

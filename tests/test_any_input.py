@@ -12,10 +12,10 @@ from manifold3d import Manifold
 from step_files import step_assembly
 from tiny_products import box, product_of, rod, to_trimesh
 
-import cell.loading as loading
+import cell.products.loading as loading
 from cell.errors import BadPart, CellError, UnknownName
-from cell.identical import handedness, identical_parts
-from cell.loading import DEFAULT_DENSITY, load_product
+from cell.products.identical import handedness, identical_parts
+from cell.products.loading import DEFAULT_DENSITY, load_product
 from experiments.cli.main import main
 
 PLATE = box((40, 40, 10), (-20, -20, 0)) - rod(6, -1, 11, 32) - rod(6, -1, 11).translate([12, 0, 0])

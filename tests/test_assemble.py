@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cell.config import CellConfig
 from cell.errors import BadOrder, CellError
-from cell.loading import load_product
-from cell.phase import Outcome, Phase, after
-from cell.product import Fit, Product
-from cell.simulation import Simulation
-from cell.state import State, read_state, restore_state, save_state
+from cell.products.loading import load_product
+from cell.products.product import Fit, Product
+from cell.running.phase import Outcome, Phase, after
+from cell.running.simulation import Simulation
+from cell.running.state import State, read_state, restore_state, save_state
+from cell.settings.config import CellConfig
 from experiments import shaft_insertion
 from experiments.assembly import run as run_module
 from experiments.assembly.assemble import run_assemble, run_job

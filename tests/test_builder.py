@@ -11,9 +11,9 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell import Cell, CellConfig, Simulation, add_cell, build_cell, load_product
-from cell.events import soften_jig
+from cell.running.events import soften_jig
 from cell.soft_jig import JigState
-from cell.thread import ThreadState
+from cell.workpieces.thread import ThreadState
 
 
 def caller_diagram() -> tuple[Diagram, Context]:

@@ -13,10 +13,10 @@ from solids import assert_same_solid
 
 from cell.cad import idler, tray
 from cell.cad import motor_unit as mu
+from cell.cad.sdf import Model
 from cell.cad.shapes import revolved_surface, vertex_radius
-from cell.loading import load_product
 from cell.paths import MODELS
-from cell.sdf import Model
+from cell.products.loading import load_product
 
 MM3 = 1e-9
 OWN_MODELS = ("motor", "motor_plate", "bolt_m3x10", "motor_unit_tray")

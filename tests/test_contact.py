@@ -8,7 +8,7 @@ from manifold3d import Manifold
 from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_three
 
 from cell.errors import BadPart, CellError
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.checks import overlap_depth, without_overlaps
 from planning.fixing.contact import contact_matrix, gap_matrix, surface_gap
 from planning.fixing.solids import Solid, cog_height, combined_cog, solids_of

@@ -17,8 +17,8 @@ from tiny_products import (
 )
 
 from cell.errors import BadOrder, CellError, UnknownName
-from cell.loading import load_product
-from cell.product import Product
+from cell.products.loading import load_product
+from cell.products.product import Product
 from planning import FixingPlan, plan
 from planning.fixing.algorithm import choose_posture
 from planning.fixing.directions import open_directions

@@ -10,8 +10,8 @@ import pytest
 from tiny_products import bolted, box, peg_in_hole, product_of, rod, tube_and_pins
 
 from cell import CellConfig
-from cell.loading import load_product
-from cell.product import Product
+from cell.products.loading import load_product
+from cell.products.product import Product
 from cell.soft_jig import JigParameters
 from planning import plan
 from planning.fixing.algorithm import Geometry

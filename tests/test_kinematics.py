@@ -7,7 +7,7 @@ import pytest
 from planning_cell import TOOL_DOWN, planning_cell
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cell.arm import Arm
+from cell.machines.arm import Arm
 from planning.motion.collision_model import CollisionModel
 from planning.motion.kinematics import (
     LIMIT_MARGIN,

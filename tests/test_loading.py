@@ -7,8 +7,8 @@ import pytest
 import trimesh
 
 from cell.errors import BadOrder, BadPart, CellError, UnknownName
-from cell.loading import load_product
-from cell.mesh_io import MESH_SUFFIXES
+from cell.products.loading import load_product
+from cell.products.mesh_io import MESH_SUFFIXES
 
 GOOD = """
 name: pair

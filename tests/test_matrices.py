@@ -15,8 +15,8 @@ from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_th
 
 import cell.cad.motor_unit as cad
 from cell.cad import shapes
-from cell.loading import load_product
-from cell.product import Product
+from cell.products.loading import load_product
+from cell.products.product import Product
 from planning import FixingPlan, plan
 from planning.fixing.cache import cached_matrices, key_of
 from planning.fixing.contact import contact_matrix, gap_matrix

@@ -18,7 +18,7 @@ from tiny_products import (
     tube_and_pins,
 )
 
-from cell.loading import load_product
+from cell.products.loading import load_product
 from planning import plan
 from planning.fixing.directions import DIRECTIONS
 from planning.ordering.items import Items, items_of

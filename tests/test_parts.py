@@ -14,7 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell import load_product
 from cell.errors import UnknownName
-from cell.parts import LoosePart, Parts, add_parts
+from cell.workpieces.parts import LoosePart, Parts, add_parts
 
 HIGH = RigidTransform([0.0, 0.0, 1.0])
 

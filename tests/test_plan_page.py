@@ -16,8 +16,8 @@ from test_report import Outline
 from tiny_products import interlocked_links, peg_in_hole, stack_of_three, tube_and_pins
 
 from cell import CellConfig
-from cell.loading import load_product
-from cell.product import Product
+from cell.products.loading import load_product
+from cell.products.product import Product
 from cell.soft_jig import BagParameters
 from experiments.plan import page
 from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement

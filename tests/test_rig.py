@@ -8,9 +8,9 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell import CellConfig, load_product
 from cell.errors import BadPart, UnknownName
-from cell.rig import HandPose, build_push_rig
-from cell.rig_simulation import RigSimulation, smooth_path, stroke_path
 from cell.soft_jig import SurfaceSamples
+from cell.trial.rig import HandPose, build_push_rig
+from cell.trial.rig_simulation import RigSimulation, smooth_path, stroke_path
 from experiments.paper.cases import Case, case_seed, judged, wilson
 from experiments.paper.postures import AXES, POSTURES, PUSHES, chosen
 from experiments.paper.push_rule import push_line

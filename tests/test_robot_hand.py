@@ -8,9 +8,9 @@ from pydrake.math import RigidTransform
 
 from cell import CellConfig, load_product
 from cell.errors import CellError
-from cell.phase import PhaseFailed
-from cell.rig import SLIDE_DRIVE, TURN_DRIVE
-from cell.stroke import Stroke
+from cell.running.phase import PhaseFailed
+from cell.trial.rig import SLIDE_DRIVE, TURN_DRIVE
+from cell.trial.stroke import Stroke
 from experiments.paper.cases import Case, check_hand, judged
 from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.push_rule import leading, push_line

@@ -1,4 +1,4 @@
-"""Text written by cell.sdf is read back by Drake with the same physics."""
+"""Text written by cell.cad.sdf is read back by Drake with the same physics."""
 
 from pathlib import Path
 
@@ -12,10 +12,10 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
+from cell.cad.sdf import LINK, Contact, Look, Model, Piece, mesh_inertia, sdf_text, write_model
 from cell.errors import BadPart
-from cell.loading import load_product
 from cell.paths import model_url, new_parser
-from cell.sdf import LINK, Contact, Look, Model, Piece, mesh_inertia, sdf_text, write_model
+from cell.products.loading import load_product
 
 
 def brick(size: tuple[float, float, float] = (0.1, 0.2, 0.3)) -> trimesh.Trimesh:

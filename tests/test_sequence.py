@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import pytest
 
-from cell.loading import load_product
-from cell.product import Product
+from cell.products.loading import load_product
+from cell.products.product import Product
 from planning.fixing.planner import plan
 from planning.operations.sequence import NoOperation, Operation, fixed_after, operations
 

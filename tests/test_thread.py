@@ -9,7 +9,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 from thread_rig import ThreadRig
 
-from cell.thread import (
+from cell.workpieces.thread import (
     BIT_GATE,
     ENGAGED_MASS_FACTOR,
     THREAD_GATE,

@@ -9,7 +9,7 @@ from pydrake.math import RigidTransform
 from tiny_products import bolted, box, product_of, rod, to_trimesh
 
 from cell.errors import CellError
-from cell.product import Part, Product
+from cell.products.product import Part, Product
 from planning import plan
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.matrices import matrices_of

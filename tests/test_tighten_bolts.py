@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cell.phase import Sensed
+from cell.running.phase import Sensed
 from planning.operations.station import Station
 from planning.operations.tighten_bolts import CLUTCH_TIME, Clutch, star_order
 

@@ -11,10 +11,10 @@ from pydrake.multibody.tree import PrismaticJoint
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cell.loading import load_product
+from cell.cad.sdf import LINK
 from cell.paths import model_url, new_parser
-from cell.product import Grasp, Product
-from cell.sdf import LINK
+from cell.products.loading import load_product
+from cell.products.product import Grasp, Product
 
 SETTLING = 5e-4  # [m] Half of the play between parts and stops.
 TILTING = 1.0  # [deg]

@@ -12,11 +12,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from cell import CellConfig, load_product
-from cell.arm import Drive
+from cell.machines.arm import Drive
+from cell.machines.tools import connect_driver, set_driver_gains
 from cell.paths import model_url, new_parser
-from cell.product import Product
-from cell.thread import BIT_SEAT, add_thread
-from cell.tools import connect_driver, set_driver_gains
+from cell.products.product import Product
+from cell.workpieces.thread import BIT_SEAT, add_thread
 
 BOLT = "bolt_1"
 BIT_TIP = 0.28  # Of the bit's end from the tool's mount [m].

@@ -9,7 +9,7 @@ import trimesh
 from manifold3d import Manifold
 from pydrake.math import RigidTransform
 
-from cell.product import Fastener, Part, Product
+from cell.products.product import Fastener, Part, Product
 
 MM = 1e-3
 

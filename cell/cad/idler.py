@@ -37,9 +37,9 @@ from cell.cad.motor_unit import (
     upright_cylinder,
     washer_surface,
 )
+from cell.cad.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 from cell.cad.shapes import boss, box, cylinder
 from cell.cad.tray import BASE, BASE_GREY, NEST_TEAL, PLASTIC, PRINTED, bolt_nest
-from cell.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 
 # The post: square, so that jaws and bed meet flat sides.
 POST_SIDE, POST_HEIGHT = 34.0, 50.0

@@ -19,6 +19,7 @@ from manifold3d import Manifold
 from pydrake.geometry import Box, Cylinder
 from pydrake.math import RigidTransform
 
+from cell.cad.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 from cell.cad.shapes import (
     boss,
     box,
@@ -33,7 +34,6 @@ from cell.cad.shapes import (
     to_trimesh,
     vertex_radius,
 )
-from cell.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 
 MM = 1e-3
 

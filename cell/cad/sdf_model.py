@@ -15,7 +15,7 @@ from xml.etree import ElementTree
 import numpy as np
 import trimesh
 
-from cell.mesh_io import obj_text
+from cell.products.mesh_io import obj_text
 
 PACKAGE = "package://soft_jig_models/sdf"
 Color = tuple[float, float, float]

@@ -22,8 +22,8 @@ from cell.cad.motor_unit import (
     MM,
     box_piece,
 )
+from cell.cad.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 from cell.cad.shapes import box, to_trimesh, vertex_radius
-from cell.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
 
 BASE = (260.0, 200.0, 8.0)
 PRINTED = 1240.0  # kg/m3, PLA [A].

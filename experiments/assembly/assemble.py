@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
-from cell.config import CellConfig
-from cell.product import Product
+from cell.products.product import Product
+from cell.settings.config import CellConfig
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import check_models, running_cell

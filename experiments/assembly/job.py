@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
-from cell.config import CellConfig
-from cell.product import Product
+from cell.products.product import Product
+from cell.settings.config import CellConfig
 
 
 @dataclass(frozen=True)

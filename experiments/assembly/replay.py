@@ -20,8 +20,8 @@ from pydrake.geometry import (
 )
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
-from cell.builder import Cell
 from cell.errors import UnknownName
+from cell.running.builder import Cell
 from cell.soft_jig.jig import MEMBRANE, SILICONE_COLOR
 from cell.soft_jig.visual import membrane_shape
 from experiments.reporting.output import write_text

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.state import State
+from cell.running.state import State
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import Disturbance

@@ -38,7 +38,7 @@ class Assemble:
             out = folders.enter_context(output_folder(self.common.out))
             if self.replay is not None:
                 folders.enter_context(output_folder(self.replay.absolute().parent))
-            from cell.loading import load_product
+            from cell.products.loading import load_product
             from experiments.assembly.assemble import run_assemble
 
             return run_assemble(

@@ -13,7 +13,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.errors import CellError
-from cell.loading import load_product
+from cell.products.loading import load_product
 from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
 from experiments.cli.assemble import Assemble

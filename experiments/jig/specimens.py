@@ -22,7 +22,7 @@ from pydrake.multibody.tree import RigidBody, SpatialInertia
 from trimesh.exchange.obj import export_obj
 
 from cell.paths import model_url, new_parser
-from cell.product import Part
+from cell.products.product import Part
 
 Array = NDArray[np.float64]
 

@@ -9,10 +9,10 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import binomtest
 
-from cell.config import CellConfig
 from cell.errors import CellError
-from cell.product import Product
-from cell.stage import Observer
+from cell.products.product import Product
+from cell.settings.config import CellConfig
+from cell.trial.stage import Observer
 from experiments.paper.postures import Posture, Push
 from experiments.paper.rig_hand import RigBench
 from experiments.paper.robot_hand import RobotBench

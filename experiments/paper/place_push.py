@@ -8,10 +8,10 @@ from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.progress import Progress
 
-from cell.config import CellConfig
 from cell.errors import CellError
-from cell.loading import load_product
-from cell.stage import Observer
+from cell.products.loading import load_product
+from cell.settings.config import CellConfig
+from cell.trial.stage import Observer
 from experiments.paper.case_results import Experiment, case_table, verdict, write_case_results
 from experiments.paper.cases import Case, CaseResult, run_cases
 from experiments.paper.postures import POSTURES, PUSHES, chosen

@@ -16,7 +16,7 @@ from pydrake.common.eigen_geometry import AngleAxis
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.errors import UnknownName
-from cell.product import Grasp
+from cell.products.product import Grasp
 
 MM = 1e-3
 AXES = {

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cell.stage import Stage
-from cell.stroke import Stroke
+from cell.trial.stage import Stage
+from cell.trial.stroke import Stroke
 from experiments.paper.postures import AXES, MM, Push
 from experiments.paper.reach import Fingers
 from planning.operations.push import PushLine

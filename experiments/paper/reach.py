@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import Box, Cylinder
 
-from cell.stage import Stage
+from cell.trial.stage import Stage
 
 
 @dataclass(frozen=True)

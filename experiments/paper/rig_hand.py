@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.config import CellConfig
-from cell.phase import PhaseFailed
-from cell.product import Grasp, Product
-from cell.rig import HandPose, Rig, build_push_rig
-from cell.rig_simulation import RigSimulation
-from cell.stage import Observer
+from cell.products.product import Grasp, Product
+from cell.running.phase import PhaseFailed
+from cell.settings.config import CellConfig
+from cell.trial.rig import HandPose, Rig, build_push_rig
+from cell.trial.rig_simulation import RigSimulation
+from cell.trial.stage import Observer
 from experiments.paper.postures import Posture
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening

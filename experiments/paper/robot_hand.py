@@ -13,15 +13,15 @@ from typing import cast
 
 from pydrake.math import RigidTransform
 
-from cell.builder import Cell, build_cell
-from cell.config import CellConfig
 from cell.errors import CellError
-from cell.events import rest_jig, wake_jig
-from cell.phase import Outcome, Phase, PhaseFailed, after
-from cell.product import Product
-from cell.simulation import Simulation
+from cell.products.product import Product
+from cell.running.builder import Cell, build_cell
+from cell.running.events import rest_jig, wake_jig
+from cell.running.phase import Outcome, Phase, PhaseFailed, after
+from cell.running.simulation import Simulation
+from cell.settings.config import CellConfig
 from cell.soft_jig import SurfaceSamples
-from cell.stage import Observer, Stage
+from cell.trial.stage import Observer, Stage
 from experiments.metrics.common import angle_between
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line

@@ -9,11 +9,11 @@ from typing import Protocol
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cell.config import CellConfig
 from cell.errors import BadPart
-from cell.phase import PhaseFailed
-from cell.product import Part
-from cell.stage import Observer
+from cell.products.product import Part
+from cell.running.phase import PhaseFailed
+from cell.settings.config import CellConfig
+from cell.trial.stage import Observer
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line
 from planning.operations.pick_place import SETTLE_TIME

@@ -7,7 +7,7 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import trimesh
 
-from cell.product import Product
+from cell.products.product import Product
 from cell.soft_jig import BagParameters
 from experiments.plan.scene import Color, Shown
 from planning.fixing.algorithm import FixingStep

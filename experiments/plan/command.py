@@ -9,9 +9,9 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
-from cell.config import CellConfig
-from cell.loading import load_product
-from cell.product import Product
+from cell.products.loading import load_product
+from cell.products.product import Product
+from cell.settings.config import CellConfig
 from experiments.plan.options import PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays

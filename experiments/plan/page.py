@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-from cell.product import Product
+from cell.products.product import Product
 from experiments.plan.arrangement import exploded, step_arrangement
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.scene import Shown, figure, picture

@@ -21,7 +21,7 @@ from pydrake.geometry import (
 from pydrake.math import RigidTransform
 from pydrake.systems.framework import DiagramBuilder
 
-from cell.mesh_io import obj_text
+from cell.products.mesh_io import obj_text
 from experiments.reporting.render import View, take_picture
 
 FIELD_OF_VIEW = 24.0  # [deg] Narrow: parallel edges look parallel.

@@ -24,7 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.contact import surface_gap
 from planning.fixing.directions import DIRECTIONS, axis_index, open_directions, opposite
 from planning.fixing.interference import Blocker, Interference

@@ -20,7 +20,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.interference import Blocker, Interference
 from planning.fixing.matrices import Matrices, matrices_of

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Mapping
 from itertools import combinations
 
 from cell.errors import CellError
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.solids import Solid, boxes_apart
 from planning.fixing.threads import THREAD_HEIGHT_PER_PITCH, Thread, find_thread, thickness
 

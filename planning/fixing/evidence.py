@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import FixingStep, Stop
 from planning.fixing.blocking import FRAGILE
 from planning.fixing.directions import opposite

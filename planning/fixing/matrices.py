@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.blocking import FRAGILE
 from planning.fixing.checks import without_overlaps
 from planning.fixing.contact import contact_matrix, gap_matrix

@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Sequence
 
 from cell.errors import BadOrder
-from cell.product import Product
+from cell.products.product import Product
 
 MOST_NAMED = 6  # More would hide the sentence that they are in.
 

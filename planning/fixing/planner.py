@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from cell.errors import CellError, UnknownName
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import FixingStep, Geometry, Stop, configure_fixing
 from planning.fixing.cache import cached_matrices
 from planning.fixing.directions import DIRECTIONS

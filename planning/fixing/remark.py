@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import Geometry
 from planning.fixing.directions import opposite
 from planning.fixing.solids import cog_height

@@ -11,7 +11,7 @@ import manifold3d
 import numpy as np
 
 from cell.errors import BadPart
-from cell.product import Part, Product
+from cell.products.product import Part, Product
 from planning.fixing.directions import unit_vector
 
 

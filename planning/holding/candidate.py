@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from cell.config import CellConfig
+from cell.settings.config import CellConfig
 from cell.soft_jig import JigParameters
 
 CRITERIA: Mapping[str, str] = {

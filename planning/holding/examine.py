@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import Geometry
 from planning.fixing.directions import axis_index, unit_vector
 from planning.fixing.solids import combined_cog

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import Geometry
 from planning.fixing.directions import opposite, unit_vector
 from planning.holding.footprint import USUAL_DEPTH

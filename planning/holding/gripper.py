@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from cell.cad.hand_e import STROKE as FINGER_STROKE
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import Geometry
 from planning.holding.footprint import footprint
 

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import FixingStep
 from planning.fixing.directions import DIRECTIONS, open_directions, opposite
 from planning.fixing.order import together

@@ -29,8 +29,8 @@ from pydrake.multibody.tree import (
 from pydrake.planning import RobotDiagramBuilder, SceneGraphCollisionChecker
 from pydrake.systems.framework import Context
 
-from cell.arm import Arm
 from cell.errors import UnknownName
+from cell.machines.arm import Arm
 
 HELD = "held"  # Stands for what is in the hand.
 ANYTHING = "*"

@@ -15,8 +15,8 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context
 
-from cell.arm import Arm
 from cell.errors import CellError
+from cell.machines.arm import Arm
 
 # Denavit-Hartenberg parameters of the UR5e [m], [rad]
 # [R Universal_Robots_ROS2_Description, commit 2221ec0f].

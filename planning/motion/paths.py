@@ -13,8 +13,8 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context
 
-from cell.arm import Arm
 from cell.errors import CellError
+from cell.machines.arm import Arm
 from planning.motion.collision_model import EDGE_STEP, CollisionModel
 from planning.motion.joint_path import JointPath
 from planning.motion.kinematics import Unreachable, ik_solutions, joint_limits, tool_pose

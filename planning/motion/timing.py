@@ -11,8 +11,8 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 
-from cell.arm import Arm
 from cell.errors import CellError
+from cell.machines.arm import Arm
 from cell.paths import model_url, new_parser
 from planning.motion.joint_path import JointPath
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 
-from cell.phase import Outcome, Phase, motion_finished
-from cell.product import Grasp
+from cell.products.product import Grasp
+from cell.running.phase import Outcome, Phase, motion_finished
 from planning.operations.grasping import (
     HAND_SPEED,
     Reach,

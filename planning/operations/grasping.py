@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
-from cell.product import Grasp
-from cell.tools import JAW_SETBACK
+from cell.machines.tools import JAW_SETBACK
+from cell.products.product import Grasp
+from cell.running.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
 from planning.motion.kinematics import Unreachable
 from planning.operations.station import Station
 

@@ -7,9 +7,9 @@ from collections.abc import Iterator
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.events import evacuate_jig, inflate_jig, soften_jig
-from cell.phase import Condition, Phase, Sensed, after, motion_finished
-from cell.product import Grasp
+from cell.products.product import Grasp
+from cell.running.events import evacuate_jig, inflate_jig, soften_jig
+from cell.running.phase import Condition, Phase, Sensed, after, motion_finished
 from cell.soft_jig import JigState
 from planning.motion.kinematics import Unreachable
 from planning.operations.grasping import (

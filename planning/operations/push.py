@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.interpolate import CubicSpline
 
-from cell.phase import Jaw, Phase, motion_finished
-from cell.stroke import Stroke
+from cell.running.phase import Jaw, Phase, motion_finished
+from cell.trial.stroke import Stroke
 from planning.motion.kinematics import Unreachable, tool_pose
 from planning.motion.paths import NoPath, plan_line
 from planning.motion.timing import JointMotion

@@ -11,7 +11,7 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 
 from cell.errors import CellError
-from cell.product import Fit, Product
+from cell.products.product import Fit, Product
 from planning.fixing.algorithm import FixingStep
 from planning.fixing.planner import FixingPlan
 

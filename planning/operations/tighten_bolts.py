@@ -13,8 +13,8 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 
-from cell.phase import Follow, Phase, Sensed, after, motion_finished
-from cell.thread import BIT_SEAT, Thread, ThreadState
+from cell.running.phase import Follow, Phase, Sensed, after, motion_finished
+from cell.workpieces.thread import BIT_SEAT, Thread, ThreadState
 from planning.motion.kinematics import Unreachable
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import backed_off

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import dataclass
 
-from cell.product import Product
+from cell.products.product import Product
 from planning.fixing.algorithm import Geometry
 from planning.fixing.solids import Solid
 from planning.ordering.items import Items, as_set, items_of

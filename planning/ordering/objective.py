@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.config import PlacementConfig
+from cell.settings.config import PlacementConfig
 from cell.soft_jig import JigParameters
 from planning.fixing.algorithm import choose_posture
 from planning.fixing.directions import opposite

@@ -12,16 +12,10 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import RigidBody, WeldJoint
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cell.arm import Arm, Drive, add_arm
-from cell.config import CellConfig
-from cell.jig_base import JigBase
-from cell.parts import Parts, add_parts
-from cell.paths import model_url, new_parser
-from cell.product import Product
-from cell.sensors import WrenchSensor
-from cell.soft_jig import SoftJig
-from cell.thread import Thread, add_thread
-from cell.tools import (
+from cell.machines.arm import Arm, Drive, add_arm
+from cell.machines.jig_base import JigBase
+from cell.machines.sensors import WrenchSensor
+from cell.machines.tools import (
     Driver,
     Gripper,
     connect_driver,
@@ -29,6 +23,12 @@ from cell.tools import (
     set_driver_gains,
     set_gripper_gains,
 )
+from cell.paths import model_url, new_parser
+from cell.products.product import Product
+from cell.settings.config import CellConfig
+from cell.soft_jig import SoftJig
+from cell.workpieces.parts import Parts, add_parts
+from cell.workpieces.thread import Thread, add_thread
 
 # The jaws wait this far open [m]: wide enough for the motor, narrow enough to see that they move.
 JAW_REST = 0.045

@@ -10,14 +10,14 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
-from cell.config import CellConfig
-from cell.jig_base import JigBase
-from cell.log import Log
-from cell.parts import LoosePart
-from cell.phase import PhaseFailed
-from cell.sensors import WrenchSensor
+from cell.machines.jig_base import JigBase
+from cell.machines.sensors import WrenchSensor
+from cell.machines.tools import Gripper
+from cell.running.log import Log
+from cell.running.phase import PhaseFailed
+from cell.settings.config import CellConfig
 from cell.soft_jig import SoftJig, SurfaceSamples
-from cell.tools import Gripper
+from cell.workpieces.parts import LoosePart
 
 # A part this far below the top of the jig's base, or this far from its axis, has dropped off [m].
 DROPPED_BELOW, DROPPED_BESIDE = 0.02, 0.12

@@ -13,7 +13,7 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 import trimesh
 
-from cell.product import Product
+from cell.products.product import Product
 
 SAME = 1e-3  # [A] Relative: above the rounding of files, below any difference that is meant.
 HANDED = 1e-4  # [A] Of the largest that it can be: less is a shape with a plane of symmetry.

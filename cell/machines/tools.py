@@ -9,7 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import Joint, ModelInstanceIndex, PdControllerGains
 from pydrake.systems.framework import Context, DiagramBuilder
 
-from cell.arm import Drive
+from cell.machines.arm import Drive
 
 # Position loop of the jaw: stiff against the grip force, soft against a width error: 0.5 mm of it
 # changes the force by 2.5 N [A].

@@ -10,12 +10,12 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from cell.arm import Arm
-from cell.builder import Cell
 from cell.errors import CellError
-from cell.log import Log
-from cell.phase import ArmCommand, Follow, Impedance, Outcome, Phase, PhaseFailed, Sensed
-from cell.sensors import PoseSensor
+from cell.machines.arm import Arm
+from cell.machines.sensors import PoseSensor
+from cell.running.builder import Cell
+from cell.running.log import Log
+from cell.running.phase import ArmCommand, Follow, Impedance, Outcome, Phase, PhaseFailed, Sensed
 from cell.soft_jig import JigState
 
 # Damping of the Cartesian impedance uses these effective masses: dominated by the reflected rotor

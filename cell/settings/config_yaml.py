@@ -1,6 +1,6 @@
 """The commented default configuration file, written from the settings in the code.
 
-``python -m cell.config_yaml`` writes ``models/config/default.yaml``.
+``python -m cell.settings.config_yaml`` writes ``models/config/default.yaml``.
 """
 
 from __future__ import annotations
@@ -10,12 +10,12 @@ from typing import Any
 
 import yaml
 
-from cell.config import CellConfig
-from cell.config_file import CONFIG_FOLDER, setting_of
-from cell.setting import Setting
+from cell.settings.config import CellConfig
+from cell.settings.config_file import CONFIG_FOLDER, setting_of
+from cell.settings.setting import Setting
 
 HEADER = """\
-# The default configuration, written by `make models` from the settings in cell/config.py.
+# The default configuration, written by `make models` from the settings in cell/settings/config.py.
 # Copy it, keep only what you change, and pass the copy with --config; or change single values
 # with --set, for example --set simulation.time_step=0.002.
 """

@@ -16,7 +16,7 @@ from pathlib import Path
 import trimesh
 
 from cell.errors import CellError
-from cell.mesh_io import check_mesh, joined
+from cell.products.mesh_io import check_mesh, joined
 
 GLTF_SUFFIX = ".glb"
 ASSEMBLY_SUFFIXES = (".step", ".stp", GLTF_SUFFIX)

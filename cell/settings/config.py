@@ -16,8 +16,8 @@ from typing import Any
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
-from cell.config_file import changed, parse_overrides, read_config_file
-from cell.setting import setting
+from cell.settings.config_file import changed, parse_overrides, read_config_file
+from cell.settings.setting import setting
 from cell.soft_jig.parameters import JigParameters
 
 

@@ -10,7 +10,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import WeldJoint
 from pydrake.systems.framework import Context
 
-from cell.parts import Parts
+from cell.workpieces.parts import Parts
 
 
 @dataclass(frozen=True)

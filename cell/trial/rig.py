@@ -34,17 +34,17 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cell.arm import Drive
-from cell.builder import JAW_REST, add_workcell, plant_config
-from cell.config import CellConfig
-from cell.jig_base import JigBase
-from cell.parts import add_parts
+from cell.machines.arm import Drive
+from cell.machines.jig_base import JigBase
+from cell.machines.sensors import WrenchSensor
+from cell.machines.tools import connect_gripper, set_gripper_gains
 from cell.paths import model_url, new_parser
-from cell.product import Product
-from cell.sensors import WrenchSensor
+from cell.products.product import Product
+from cell.running.builder import JAW_REST, add_workcell, plant_config
+from cell.settings.config import CellConfig
 from cell.soft_jig import SoftJig, SurfaceSamples
-from cell.stage import Stage
-from cell.tools import connect_gripper, set_gripper_gains
+from cell.trial.stage import Stage
+from cell.workpieces.parts import add_parts
 
 # Drives of the carriage: stiffness, damping and largest effort; slides [N/m, N s/m, N], turn and
 # tilt [N m/rad, N m s/rad, N m]. Stiffness and damping are those of the left arm's hand at the jig,

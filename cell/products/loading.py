@@ -9,14 +9,14 @@ from pathlib import Path
 import trimesh
 from pydrake.math import RigidTransform
 
-from cell.assembly_io import ASSEMBLY_SUFFIXES, load_assembly
 from cell.errors import CellError, UnknownName
-from cell.fields import one_of
-from cell.identical import group_identical, identical_parts
-from cell.mesh_io import MESH_SUFFIXES, REPAIR, load_folder, meters_per_unit
 from cell.paths import MODELS
-from cell.product import Part, Product
-from cell.product_yaml import read_product
+from cell.products.assembly_io import ASSEMBLY_SUFFIXES, load_assembly
+from cell.products.fields import one_of
+from cell.products.identical import group_identical, identical_parts
+from cell.products.mesh_io import MESH_SUFFIXES, REPAIR, load_folder, meters_per_unit
+from cell.products.product import Part, Product
+from cell.products.product_yaml import read_product
 
 DEFAULT_DENSITY = 2700.0
 """[kg/m3] [A] aluminium where nothing is said: plans depend on mass ratios only."""

@@ -12,10 +12,10 @@ import trimesh
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell.errors import BadPart, CellError
-from cell.fields import Fields, one_of
-from cell.mesh_io import LARGEST_PART, load_mesh
 from cell.paths import MODELS
-from cell.product import Grasp, Part
+from cell.products.fields import Fields, one_of
+from cell.products.mesh_io import LARGEST_PART, load_mesh
+from cell.products.product import Grasp, Part
 
 PART_KEYS = ("model", "mesh", "mass_kg", "assembled_pose", "tray_pose", "grasps")
 POSE_KEYS = ("xyz_mm", "rpy_deg")

@@ -16,7 +16,7 @@ from pydrake.geometry import Box, Cylinder
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.errors import BadPart
-from cell.mesh_io import obj_text
+from cell.products.mesh_io import obj_text
 
 LINK = "body"
 """Name of the only link of a part's model."""

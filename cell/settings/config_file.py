@@ -14,7 +14,7 @@ import yaml
 
 from cell.errors import UnknownName
 from cell.paths import MODELS
-from cell.setting import BadSetting, Setting, converted
+from cell.settings.setting import BadSetting, Setting, converted
 
 CONFIG_FOLDER = MODELS / "config"
 Section = TypeVar("Section")

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
-from cell.events import press_into_bed
-from cell.simulation import Simulation
-from cell.thread import ThreadState
+from cell.running.events import press_into_bed
+from cell.running.simulation import Simulation
+from cell.workpieces.thread import ThreadState
 
 State = dict[str, np.ndarray]
 

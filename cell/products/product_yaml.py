@@ -10,9 +10,9 @@ from typing import Any
 import yaml
 
 from cell.errors import BadOrder, CellError
-from cell.fields import Fields, names_at, one_of
-from cell.part_yaml import model_name, read_part
-from cell.product import Fastener, Fit, Part, Product
+from cell.products.fields import Fields, names_at, one_of
+from cell.products.part_yaml import model_name, read_part
+from cell.products.product import Fastener, Fit, Part, Product
 
 PRODUCT_KEYS = (
     "name",

@@ -38,7 +38,7 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from cell.product import Fastener
+from cell.products.product import Fastener
 
 # Ball constraints must sit at about the bolt's radius of gyration: there they are stiffest
 # (measured in Drake: 3.7e6 N/m at 3 mm against 4e5 at 10 mm for a 1.2 g bolt at 1 ms) [M].

@@ -20,7 +20,7 @@ from pydrake.systems.framework import Context
 
 from cell.errors import UnknownName
 from cell.paths import model_url, new_parser
-from cell.product import Part, Product
+from cell.products.product import Part, Product
 
 
 @dataclass

@@ -8,7 +8,7 @@ import numpy as np
 import trimesh
 
 from cell.errors import BadPart, CellError, UnknownName
-from cell.repair import repaired
+from cell.products.repair import repaired
 
 METERS_PER_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
 """Metres per CAD unit, by the name used on the command line."""

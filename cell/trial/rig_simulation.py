@@ -12,10 +12,10 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from cell.errors import CellError
-from cell.rig import HandPose, Rig
 from cell.soft_jig import JigState, SoftJig
-from cell.stage import Observer
-from cell.stroke import Stroke
+from cell.trial.rig import HandPose, Rig
+from cell.trial.stage import Observer
+from cell.trial.stroke import Stroke
 
 
 @dataclass(frozen=True)

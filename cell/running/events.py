@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from cell.simulation import Simulation
+from cell.running.simulation import Simulation
 from cell.soft_jig import SurfaceSamples
 
 Event = Callable[[Simulation], None]
