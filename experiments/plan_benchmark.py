@@ -32,10 +32,10 @@ from cell.settings.config import CellConfig
 from planning.fixing.cache import cached_matrices
 from planning.fixing.contact import gap_matrix
 from planning.fixing.matrices import matrices_of
-from planning.fixing.planner import plan
 from planning.fixing.solids import solids_of
 from planning.holding.candidate import Setup
-from planning.holding.rule import general_rule
+from planning.plans.planner import plan
+from planning.plans.rule import general_rule
 
 STATION = 30.0  # [mm] Pitch of the stations of the bench assemblies.
 

@@ -24,13 +24,13 @@ from experiments.assembly.job import Job
 from experiments.assembly.prepare import Disturbance, running_cell
 from experiments.assembly.run import Run, go_on
 from experiments.metrics.record import OperationRecord
-from planning.fixing.planner import plan
 from planning.operations import insert_shaft
 from planning.operations.carry_out import phases
 from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import goal_pose
 from planning.operations.sequence import Operation, operations
 from planning.operations.station import Station
+from planning.plans.planner import plan
 
 PRODUCT = load_product("motor_unit")
 CONFIG = CellConfig()

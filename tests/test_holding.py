@@ -22,7 +22,7 @@ from planning.holding.footprint import footprint, posture
 from planning.holding.gravity import Gravity
 from planning.holding.gripper import BELOW, STROKE, Gripper
 from planning.holding.imprint import Imprint, press, samples_of
-from planning.holding.rule import general_rule
+from planning.plans.rule import general_rule
 
 JIG = JigParameters()
 SETUP = Setup.of(CellConfig.load())

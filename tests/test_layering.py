@@ -20,6 +20,14 @@ ROOMS = {
         "running": {"soft_jig", "settings", "products", "workpieces", "machines"},
         "trial": {"soft_jig", "settings", "products", "workpieces", "machines", "running"},
     },
+    "planning": {
+        "fixing": set(),
+        "holding": {"fixing"},
+        "ordering": {"fixing", "holding"},
+        "plans": {"fixing", "holding", "ordering"},
+        "motion": set(),
+        "operations": {"fixing", "motion", "plans"},
+    },
     "experiments": {
         "reporting": set(),
         "metrics": set(),
@@ -32,7 +40,7 @@ ROOMS = {
 }
 # Files beside the rooms of cell that any room may use, and that use none. Those of experiments are
 # scripts: they may use any room, and nothing uses them.
-LEAVES = {"cell": {"errors", "paths"}, "experiments": set()}
+LEAVES = {"cell": {"errors", "paths"}, "planning": set(), "experiments": set()}
 EVERY_ROOM = [(package, room) for package, rooms in ROOMS.items() for room in rooms]
 MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
 

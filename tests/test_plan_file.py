@@ -22,8 +22,8 @@ from experiments.plan.command import run_plan
 from experiments.plan.options import PlanOptions
 from planning import FixingPlan, load_plan, plan, save_plan
 from planning.fixing.directions import DIRECTIONS
-from planning.fixing.explain import explanation, stop_text
-from planning.fixing.plan_file import plan_to_dict
+from planning.plans.explain import explanation, stop_text
+from planning.plans.plan_file import plan_to_dict
 
 PRODUCTS = [peg_in_hole, interlocked_links, stack_of_three, tube_and_pins]
 

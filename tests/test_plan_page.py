@@ -30,7 +30,7 @@ from planning import plan
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.remark import bolt_remarks
 from planning.holding.candidate import Setup
-from planning.holding.rule import general_rule
+from planning.plans.rule import general_rule
 
 BAG = BagParameters()
 SETUP = Setup.of(CellConfig())

@@ -15,9 +15,9 @@ from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.replay import Replay
 from experiments.assembly.results import write_infeasible, write_results
 from experiments.assembly.run import Run, go_on, read_final_state
-from planning.fixing.explain import stop_text
-from planning.fixing.planner import FixingPlan, plan
 from planning.operations.sequence import NoOperation, Operation, operations
+from planning.plans.explain import stop_text
+from planning.plans.planner import FixingPlan, plan
 
 
 def run_assemble(

@@ -20,8 +20,8 @@ from experiments.reporting.output import write_arrays, write_json
 from experiments.reporting.plots import plot_force_plate, plot_insertion_force, plot_torque
 from experiments.reporting.provenance import finite, versions
 from experiments.reporting.report import write_report
-from planning.fixing.plan_file import plan_to_dict
-from planning.fixing.planner import FixingPlan
+from planning.plans.plan_file import plan_to_dict
+from planning.plans.planner import FixingPlan
 
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 

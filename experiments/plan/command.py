@@ -17,14 +17,14 @@ from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.evidence import evidence_text
-from planning.fixing.explain import explanation, step_table, step_texts, stop_text
-from planning.fixing.plan_file import save_plan
-from planning.fixing.planner import FixingPlan, plan
 from planning.fixing.remark import bolt_remarks
 from planning.holding.candidate import Choice, Setup
-from planning.holding.choice_file import choices_text, choices_to_list
-from planning.holding.rule import general_rule
 from planning.ordering.explain import advice_text
+from planning.plans.choice_file import choices_text, choices_to_list
+from planning.plans.explain import explanation, step_table, step_texts, stop_text
+from planning.plans.plan_file import save_plan
+from planning.plans.planner import FixingPlan, plan
+from planning.plans.rule import general_rule
 
 MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, also into a file.
 

@@ -18,13 +18,13 @@ from experiments.reporting.render import rendering_problem
 from planning.fixing.algorithm import READING
 from planning.fixing.directions import opposite
 from planning.fixing.evidence import evidence_text
-from planning.fixing.explain import blocker_text, step_texts, stop_text
 from planning.fixing.order import together
-from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import CRITERIA, Candidate, Choice, Setup
 from planning.holding.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.explain import advice_text, arrow_text
+from planning.plans.explain import blocker_text, step_texts, stop_text
+from planning.plans.planner import FixingPlan
 
 MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
 MOST_BLOCKERS = 400

@@ -1,1 +1,1 @@
-"""Which part is fixed on the jig in which posture: matrices, Algorithm 1, the plan."""
+"""Which part is fixed on the jig in which posture: matrices and Algorithm 1."""

@@ -1,1 +1,1 @@
-"""How well the jig would hold: footprint, imprint, holding force, gripper; the general rule."""
+"""How well the jig would hold a candidate: footprint, imprint, capacity, room for the gripper."""

@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from cell.errors import CellError
 from cell.products.product import Fit, Product
 from planning.fixing.algorithm import FixingStep
-from planning.fixing.planner import FixingPlan
+from planning.plans.planner import FixingPlan
 
 
 class NoOperation(CellError):

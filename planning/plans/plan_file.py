@@ -16,8 +16,8 @@ from planning.fixing.algorithm import READING, FixingStep, Stop
 from planning.fixing.directions import DIRECTIONS
 from planning.fixing.evidence import evidence_from_dict, evidence_to_dict
 from planning.fixing.interference import Blocker
-from planning.fixing.planner import FixingPlan
 from planning.ordering.advice_file import advice_from_dict, advice_to_dict
+from planning.plans.planner import FixingPlan
 
 
 def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:

@@ -11,8 +11,8 @@ from planning.fixing.algorithm import READING, FixingStep
 from planning.fixing.directions import DIRECTIONS, open_directions
 from planning.fixing.interference import Blocker
 from planning.fixing.order import together
-from planning.fixing.planner import FixingPlan
 from planning.ordering.explain import precedence_text
+from planning.plans.planner import FixingPlan
 
 
 def step_table(plan: FixingPlan) -> Table:

@@ -15,9 +15,9 @@ from cell.products.product import Product
 from planning.fixing.algorithm import FixingStep
 from planning.fixing.directions import DIRECTIONS, open_directions, opposite
 from planning.fixing.order import together
-from planning.fixing.planner import FixingPlan
 from planning.holding.candidate import Candidate, Choice, Setup
 from planning.holding.examine import Examiner, Trial
+from planning.plans.planner import FixingPlan
 
 
 def general_rule(product: Product, fixing: FixingPlan, setup: Setup) -> tuple[Choice, ...]:
