@@ -17,10 +17,13 @@ from experiments.jig_convergence import (
 
 
 def test_every_setting_varies_one_thing() -> None:
-    """It differs from the default in one number at most, and every sequence has the default."""
+    """It differs from the default in one number at most, and every sequence has the default.
+
+    Only what is dragged slowly differs in speed and approximation.
+    """
     default = Setting("", "", parameters())
     sequences: dict[str, list[int]] = {}
-    for setting in settings():
+    for setting in (each for each in settings() if each.speed == default.speed):
         changed = [
             setting.params.jammed != default.params.jammed,
             setting.params.bag != default.params.bag,
