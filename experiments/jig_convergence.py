@@ -6,9 +6,8 @@ one at a time from the defaults. Vented, 90 kPa: elastic contact and yield alone
 with the change over the last refinement and writes it as `convergence.csv`.
 
 The approximation in use is "lagged": what it holds does not depend on how fast the part is dragged.
-With "sap", whose friction is regularised and whose dissipation is a relaxation time, the force grows
-with speed and comes down to that of "lagged" as the speed goes to zero, so that both are measured
-at two speeds.
+With "sap" (regularised friction, dissipation as a relaxation time) the force grows with speed, and
+comes down towards that of "lagged" as the speed goes to zero: both are measured at two speeds.
 """
 
 from __future__ import annotations
