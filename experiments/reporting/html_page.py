@@ -28,12 +28,13 @@ def section(heading: str, content: str) -> str:
 
 
 def figures(pictures: Iterable[Picture]) -> str:
-    """Return pictures with their captions."""
-    return "\n".join(
+    """Return pictures with their captions, side by side where there is room."""
+    each = "\n".join(
         f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,'
         f'{base64.b64encode(png).decode()}"><figcaption>{escape(caption)}</figcaption></figure>'
         for caption, png in pictures
     )
+    return f'<div class="figures">\n{each}\n</div>' if each else ""
 
 
 def table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:

@@ -43,13 +43,13 @@ def write_report(
     """
     sections = [
         _summary(title, result, notes),
-        section("Pictures", figures(pictures)),
         section("Steps", table(result.get("steps", ()), STEP_COLUMNS)),
         section("Cases", table(result.get("cases", ()), CASE_COLUMNS)),
         section("Successes and failures", table(_outcomes(result), OUTCOME_COLUMNS)),
+        section("Pictures", figures(pictures)),
+        section("Plots", figures(plots)),
         section("Measured", _measured(result)),
         section("Plan", _plan(plan)),
-        section("Plots", figures(plots)),
         section("Versions", pairs(result.get("versions", {}))),
         section("Configuration", _json(result.get("config", {}))),
     ]
@@ -57,7 +57,7 @@ def write_report(
 
 
 def _summary(title: str, result: Mapping[str, Any], notes: Sequence[str]) -> str:
-    facts = {name: result[name] for name in SUMMARY if name in result}
+    facts = {name: result[name] for name in SUMMARY if result.get(name) not in (None, [])}
     verdict = cell(result["verdict"]) if "verdict" in result else ""
     paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
     return f"<h1>{escape(title)}</h1>\n<p>{verdict}</p>\n{paragraphs}{pairs(facts)}"
