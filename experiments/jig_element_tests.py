@@ -162,7 +162,7 @@ REASONS = """Differences beyond 30 %:
   (E50 10 MPa). With the reference's 33 MPa, an upper bound, it holds 30 and 32 N at 5 and 10 mm.
 - Frozen punch: it gives way at half of c Nc A, 2 to 3 mm deep, also with beads that never yield:
   the mesh's pressure falls off towards the edges of a column once the part is half a mesh size in.
-  With layers of 10 mm it still bears more at 2 mm. A press is 20 N.
+  A press is 20 N.
 - Sealed pull: the reference has 41 N of friction on sides that are sealed as well (0.28 of the
   vacuum as shear); suction here acts on flat faces only.
 - At 0 kPa the weight alone turns back 0.034 N m: compare the moments less the weight's own.
