@@ -13,14 +13,11 @@ from scipy.spatial.transform import Rotation
 
 from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import TetMesh
-from cell.soft_jig.contact_mesh import (
-    FOOT_GAP,
-    bed_mesh,
-    imprint_mesh,
-)
+from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
 from cell.soft_jig.parameters import JigParameters
 from cell.soft_jig.plane_cells import conforming_cells, outline
 from cell.soft_jig.polygons import area, clip, lower_facets, subtract
+from cell.soft_jig.rings import FOOT_GAP
 from cell.soft_jig.samples import SurfaceSamples
 
 PARAMS = JigParameters()

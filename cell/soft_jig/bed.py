@@ -43,6 +43,7 @@ class Bed:
     Attributes:
         heights: (n, n) plastic surface [m], 0 outside the aperture.
         active: (n, n) bool, cells inside the aperture.
+        covered: (n, n) bool, cells under a part when the bed froze.
         axis: (n,) coordinates of the cell centres along x and y [m].
         vacuum: Confining pressure from the pump [Pa]; set by the owner.
     """
@@ -65,6 +66,7 @@ class Bed:
     def inflate(self) -> None:
         """Blow the bag up: the bare cap again, every imprint gone."""
         self.heights = self._dome.copy()
+        self.covered = np.zeros(self.heights.shape, dtype=bool)
         self._shrinkage = np.zeros_like(self.heights)
         self._settled = self.heights  # When the collar was raised last.
         self.ledger = Ledger()
@@ -105,8 +107,22 @@ class Bed:
 
     def height_at(self, xy: Array) -> Array:
         """Return the surface height at (k, 2) points, bilinear [m]."""
+        return self._interpolated(self.heights, xy)
+
+    def height_beside(self, xy: Array) -> Array:
+        """Return the height (k,) that the frozen bed has beside the parts in it [m].
+
+        Cells that a part covered take the height of the nearest one beside it: a cell on a part's
+        border is half in the imprint, and the part is up to `STAY` cells off the grid.
+        """
+        beside = ndimage.distance_transform_edt(
+            self.covered, return_distances=False, return_indices=True
+        )
+        return self._interpolated(self.heights[tuple(beside)], xy)
+
+    def _interpolated(self, heights: Array, xy: Array) -> Array:
         index = (np.asarray(xy, dtype=float) - self.axis[0]) / self.bag.cell
-        return ndimage.map_coordinates(self.heights, index.T, order=1, mode="nearest")
+        return ndimage.map_coordinates(heights, index.T, order=1, mode="nearest")
 
     # Pressing.
 
@@ -335,7 +351,7 @@ class Bed:
             contraction: Volumetric shrinkage; all of it appears as height, the base is rigid.
         """
         ceiling = self._ceiling()
-        held = ceiling <= self.heights
+        held = self.covered = ceiling <= self.heights
         conformed = np.where(held, np.maximum(ceiling, self.bag.floor), self.heights)
         self._displace(self.heights.sum(), conformed)
         self.heights = conformed
@@ -362,6 +378,7 @@ class Bed:
         """Let air in again: the shrinkage goes back, the imprint stays."""
         self.heights = self.heights + self._shrinkage
         self._shrinkage = np.zeros_like(self.heights)
+        self.covered = np.zeros_like(self.covered)
         self._update_yield()
 
     # Saving.
@@ -370,6 +387,7 @@ class Bed:
         """Return a copy of everything that changes; `restore` continues bit for bit."""
         return {
             "heights": self.heights.copy(),
+            "covered": self.covered.copy(),
             "traction": self._traction.copy(),
             "pressure": self._pressure.copy(),
             "carried": {name: carried.row() for name, carried in self._carried.items()},
@@ -386,6 +404,7 @@ class Bed:
         """Return to a saved state."""
         self.inflate()
         self.heights = state["heights"].copy()
+        self.covered = state["covered"].copy()
         self._traction = state["traction"].copy()
         self._pressure = state["pressure"].copy()
         self._carried = {k: Carried.from_row(row) for k, row in state.get("carried", {}).items()}

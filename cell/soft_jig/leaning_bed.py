@@ -7,6 +7,7 @@ becomes vertical, and its facets tile the floor as they do when it stands straig
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -62,10 +63,17 @@ class LeaningBed:
 
     def height_at(self, xy: Array) -> Array:
         """Return the surface height at (k, 2) points [m]."""
-        height = self.bed.height_at(xy)
+        return self._followed(self.bed.height_at, xy)
+
+    def height_beside(self, xy: Array) -> Array:
+        """Return the height (k,) of the bed beside the parts in it, `Bed.height_beside` [m]."""
+        return self._followed(self.bed.height_beside, xy)
+
+    def _followed(self, height_at: Callable[[Array], Array], xy: Array) -> Array:
+        height = height_at(xy)
         if self.lean.any():
             for _ in range(STEPS):
-                height = self.bed.height_at(xy + np.multiply.outer(height - self.level, self.lean))
+                height = height_at(xy + np.multiply.outer(height - self.level, self.lean))
         return height
 
     def _sheared(self, points: Array, lean: Array) -> Array:
