@@ -291,3 +291,21 @@ def test_restored_bed_continues_bit_for_bit(punch: SurfaceSamples) -> None:
         )
     assert np.array_equal(np.array(forces[0]), np.array(forces[1]))
     assert np.array_equal(bed.heights, other.heights)
+
+
+@pytest.mark.parametrize("aside", [0.0, 0.7e-3, 1.1e-3])
+def test_height_beside_does_not_look_into_the_imprint(aside: float) -> None:
+    """Beside a bar and over it: the bed's own height, wherever the bar is on the grid."""
+    bar = trimesh.creation.box((0.040, 0.005, 0.030))
+    bar.apply_translation([0, 0, 0.015])
+    samples = SurfaceSamples.of("bar", bar)
+    bed = new_bed()
+    for k in range(1, 801):
+        press_at(bed, samples, [0, aside, bed.bag.cap_height - k * 1e-5], [0, 0, -0.01])
+    bed.jam(0.0)
+    across = np.linspace(-0.5e-3, 2e-3, 6) + 0.0025
+    beside = bed.height_beside(np.column_stack([np.zeros(6), aside + across]))
+    assert beside.min() > 0.045
+    assert np.ptp(beside) < 0.4e-3
+    bed.unjam()
+    assert bed.height_beside(np.array([[0.0, aside]]))[0] < 0.039

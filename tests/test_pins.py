@@ -8,7 +8,7 @@ import trimesh
 
 from cell.soft_jig import JigParameters, SurfaceSamples
 from cell.soft_jig.bed import Bed
-from cell.soft_jig.contact_mesh import bed_mesh
+from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
 from cell.soft_jig.parameters import SoilParameters
 from cell.soft_jig.pins import Pins
 from cell.soft_jig.yielding import Strength
@@ -97,3 +97,21 @@ def test_saved_pins_continue_alike() -> None:
     pushed.push(at(0.9e-3), STRENGTH)
     forces = [pins.push(at(0.9e-3), STRENGTH)[0] for pins in (pushed, again)]
     assert np.array_equal(forces[0], forces[1])
+
+
+def test_crack_beside_a_faceted_hull_holds_no_bead() -> None:
+    """A round punch sticks out of its 24-sided hull by 0.15 mm: that is not a pin."""
+    radius, sides = 0.0175, 24
+    punch = trimesh.creation.cylinder(radius=radius, height=0.05, sections=240)
+    punch.apply_translation([0, 0, 0.025])
+    angle = np.arange(sides) * 2 * np.pi / sides
+    ring = radius * np.column_stack([np.cos(angle), np.sin(angle)])
+    hull = np.concatenate([np.column_stack([ring, np.full(sides, z)]) for z in (0.0, 0.05)])
+    bed, samples = Bed(PARAMS.bag, PARAMS.soil), SurfaceSamples.of("punch", punch, 0.4e-3)
+    for k in range(1, 1001):
+        p_JP = np.array([0.0, 0.0, APEX - k * 1e-5])
+        bed.press((STAYS, p_JP), (np.zeros(3), np.array([0, 0, -0.01])), samples, 1e-3)
+        bed.settle(1e-3)
+    bed.jam(0.0)
+    mesh = imprint_mesh(bed, PARAMS.jammed, [hull + p_JP])
+    assert len(Pins.inside(mesh, samples, (STAYS, p_JP), MODULUS, HEAVY, 1e-3).areas) == 0

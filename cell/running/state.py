@@ -56,7 +56,7 @@ def _flat(nested: Mapping[str, Any], prefix: str) -> State:
 
 def _nested(flat: State, prefix: str) -> dict[str, Any]:
     """Undo `_flat` for the names under a prefix."""
-    nested: dict[str, Any] = {"bed": {"reference": {}}}
+    nested: dict[str, Any] = {}
     for path, value in flat.items():
         if path.startswith(f"{prefix}/"):
             *folders, name = path.split("/")[1:]

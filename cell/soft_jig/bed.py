@@ -22,18 +22,14 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from cell.soft_jig.collar import Ledger, rise_weight, shoulder
+from cell.soft_jig.footprints import Footprints
 from cell.soft_jig.parameters import BagParameters, SoilParameters
-from cell.soft_jig.samples import SurfaceSamples, Underside
+from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.stable import Carried, Springs, cross_matrix, largest_stiffness, normal_rows
 
 Array = NDArray[np.float64]
 Contact = tuple[NDArray[np.int64], Array]
 
-# Rotation after which the visible underside of a part is selected anew [rad]: the selection only
-# decides which points stand for the surface, one per cell, so a fraction of a cell does not matter.
-RESELECT_ANGLE = 0.01
-# Share of a cell by which a part moves on before its points change cells; above one half.
-STAY = 0.8
 _SCALARS = ("vacuum", "stretch", "tension", "_since_settled")
 
 
@@ -73,9 +69,7 @@ class Bed:
         self._traction = np.zeros((self.heights.size, 2))
         self._pressure = np.zeros(self.heights.size)
         self._carried: dict[str, Carried] = {}
-        self._reference: dict[str, Array] = {}  # Orientation at which an underside was selected.
-        self._shifts: dict[str, Array] = {}  # Of its points, in cells.
-        self._undersides: dict[str, Underside] = {}
+        self._footprints = Footprints(self.axis, self.bag.cell, self.active)
         self._ceilings: dict[str, Contact] = {}  # Undersides over the bed in the latest step.
         self._step_done = False
         self._since_settled = 0.0
@@ -113,7 +107,8 @@ class Bed:
         """Return the height (k,) that the frozen bed has beside the parts in it [m].
 
         Cells that a part covered take the height of the nearest one beside it: a cell on a part's
-        border is half in the imprint, and the part is up to `STAY` cells off the grid.
+        border is half in the imprint, and the part is up to `footprints.STAY` cells off the
+        grid.
         """
         beside = ndimage.distance_transform_edt(
             self.covered, return_distances=False, return_indices=True
@@ -151,7 +146,7 @@ class Bed:
         if self._step_done:
             self._ceilings.clear()
             self._step_done = False
-        p_PQ_J, z, areas, cells = self._points_over_bed(X_JP, samples)
+        p_PQ_J, z, areas, cells = self._footprints.under(X_JP, samples)
         self._ceilings[samples.name] = (cells, z)
         touching = np.flatnonzero(z < self.heights.reshape(-1)[cells])
         V = np.concatenate(V_JP)
@@ -178,46 +173,6 @@ class Bed:
         total = force.sum(axis=0)
         self._carried[samples.name] = Carried(V, np.concatenate([torque, total]), True)
         return total, torque
-
-    def _points_over_bed(
-        self, X_JP: tuple[Array, Array], samples: SurfaceSamples
-    ) -> tuple[Array, Array, Array, NDArray[np.int64]]:
-        """Return the underside's arms, heights over the cells' centres, areas and cell numbers."""
-        R_JP, p_JP = X_JP
-        under = self._underside(R_JP, samples)
-        p_PQ_J = under.points @ R_JP.T
-        n = len(self.axis)
-        shift = self._shift_of(samples.name, p_JP[:2])
-        # The grid's border lies outside the aperture: clipping drops points, it does not move them.
-        column = np.clip(under.bins + shift, 0, n - 1).astype(np.int64)
-        flat = column[:, 0] * n + column[:, 1]
-        keep = np.flatnonzero(self.active.reshape(-1)[flat])
-        to_center = self.axis[0] + column * self.bag.cell - p_JP[:2] - p_PQ_J[:, :2]
-        z = p_PQ_J[:, 2] + p_JP[2] + np.einsum("ij,ij->i", under.slopes, to_center)
-        return p_PQ_J[keep], z[keep], under.areas[keep], flat[keep]
-
-    def _shift_of(self, name: str, p_JP: Array) -> Array:
-        """Return by how many cells (2,) a part is shifted.
-
-        One whole-cell shift for the part: its bins then cover the cells without gap or overlap. It
-        is kept until the part is clearly in the next cell: a border that jumps into the wall and
-        back as the part rocks would keep it rocking.
-        """
-        exact = (p_JP - self.axis[0]) / self.bag.cell
-        shift = self._shifts.get(name)
-        if shift is None or np.abs(exact - shift).max() > STAY:
-            shift = self._shifts[name] = np.rint(exact)
-        return shift
-
-    def _underside(self, R_JP: Array, samples: SurfaceSamples) -> Underside:
-        name = samples.name
-        reference = self._reference.get(name)
-        if reference is None or np.sum(reference * R_JP) < 1 + 2 * np.cos(RESELECT_ANGLE):
-            self._reference[name] = reference = R_JP.copy()
-            self._undersides.pop(name, None)
-        if name not in self._undersides:
-            self._undersides[name] = samples.underside(reference, self.bag.cell)
-        return self._undersides[name]
 
     def _rising(
         self, springs: Springs, carried: Carried, inertia: Array, V: Array, dt: float
@@ -368,7 +323,7 @@ class Bed:
             X_JP: Rotation matrix and position of the part.
             samples: Its surface.
         """
-        _, z, _, cells = self._points_over_bed(X_JP, samples)
+        _, z, _, cells = self._footprints.under(X_JP, samples)
         heights = self.heights.reshape(-1)
         before = heights.sum()
         np.minimum.at(heights, cells, np.maximum(z, self.bag.floor))
@@ -393,8 +348,7 @@ class Bed:
             "carried": {name: carried.row() for name, carried in self._carried.items()},
             "shrinkage": self._shrinkage.copy(),
             "yield_pressure": self.yield_pressure.copy(),
-            "reference": {name: R_JP.copy() for name, R_JP in self._reference.items()},
-            "shifts": {name: shift.copy() for name, shift in self._shifts.items()},
+            "footprints": self._footprints.state(),
             "settled": self._settled.copy(),
             "ledger": self.ledger.array(),
             "scalars": np.array([getattr(self, name) for name in _SCALARS]),
@@ -410,8 +364,7 @@ class Bed:
         self._carried = {k: Carried.from_row(row) for k, row in state.get("carried", {}).items()}
         self._shrinkage = state["shrinkage"].copy()
         self.yield_pressure = state["yield_pressure"].copy()
-        self._reference = {name: R_JP.copy() for name, R_JP in state.get("reference", {}).items()}
-        self._shifts = {name: shift.copy() for name, shift in state.get("shifts", {}).items()}
+        self._footprints.restore(state.get("footprints", {}))
         self._settled = state["settled"].copy()
         self.ledger = Ledger(*map(float, state["ledger"]))
         for name, value in zip(_SCALARS, state["scalars"], strict=True):
