@@ -40,6 +40,7 @@ from experiments.jig.element_tests import (
 DEPTHS = (0.005, 0.010, 0.015)
 # The lowest stands for an open valve: beads held by membrane and weight alone.
 VACUUMS = (1.0, 30e3, 60e3, 90e3)
+WEIGHT = CYLINDER.mass * 9.81
 
 
 @dataclass(frozen=True)
@@ -102,23 +103,42 @@ def _frozen(results: Results) -> None:
 
 
 def _hold(results: Results, depth: float, vacuum: float, sealed: bool) -> None:
-    data, kind = reference(), "sealed" if sealed else "vented"
-    case = f"{kind}, {depth * 1e3:.0f} mm, {vacuum / 1e3:.0f} kPa"
-    drag = results.drags[f"push, {case}"] = push(depth, vacuum, sealed)
+    case = f"{_kind(sealed)}, {depth * 1e3:.0f} mm, {vacuum / 1e3:.0f} kPa"
+    results.drags[f"push, {case}"] = push(depth, vacuum, sealed)
+    results.drags[f"pull, {case}"] = pull(depth, vacuum, sealed)
     full = vacuum == FULL_VACUUM
-    none = [float("nan")]
-    known = data[f"{kind}_lateral"]["force_N"][DEPTHS.index(depth)] if full else none
-    formula = lateral_formula(depth, vacuum, sealed)
-    span = (min(known), max(known))
-    results.rows.append(Row(f"push, {case} [N]", drag.holding_force, formula, span))
-    moment = drag.holding_force * (PUSH_HEIGHT + depth)
-    net = moment - CYLINDER.mass * 9.81 * CYLINDER.radius
-    results.rows.append(Row(f"push, {case}: moment less the weight's own [N m]", net))
-    drag = results.drags[f"pull, {case}"] = pull(depth, vacuum, sealed)
-    known = [data["pull_out"][f"{kind}_N"]] if full and depth == DEPTHS[-1] else none
-    results.rows.append(
-        Row(f"pull, {case} [N]", drag.holding_force, reference=(known[0], known[0]))
-    )
+    _compare_push(results, case, depth, lateral_formula(depth, vacuum, sealed), full, sealed)
+    sucked = reference()["sealed_area_ratio"] * vacuum * END if sealed else 0.0
+    _compare_pull(results, case, WEIGHT + sucked, full and depth == DEPTHS[-1], sealed)
+
+
+def _kind(sealed: bool) -> str:
+    return "sealed" if sealed else "vented"
+
+
+def _compare_push(
+    results: Results, case: str, depth: float, formula: float, known: bool, sealed: bool
+) -> None:
+    force, lever = results.drags[f"push, {case}"].holding_force, PUSH_HEIGHT + depth
+    forces = np.array([np.nan])
+    if known:
+        forces = np.array(reference()[f"{_kind(sealed)}_lateral"]["force_N"][DEPTHS.index(depth)])
+    span = (float(forces.min()), float(forces.max()))
+    results.rows.append(Row(f"push, {case} [N]", force, formula, span))
+    own, low, high = (f * lever - WEIGHT * CYLINDER.radius for f in (force, *span))
+    name = f"push, {case}: moment less the weight's own [N m]"
+    results.rows.append(Row(name, own, formula * lever - WEIGHT * CYLINDER.radius, (low, high)))
+
+
+def _compare_pull(results: Results, case: str, carried: float, known: bool, sealed: bool) -> None:
+    """Compare a pull, and what is left of it without weight and suction: friction on the sides."""
+    force, data = results.drags[f"pull, {case}"].holding_force, reference()["pull_out"]
+    whole, sides = (data[f"{_kind(sealed)}_N"], data[f"{_kind(sealed)}_sides_N"])
+    if not known:
+        whole = sides = float("nan")
+    results.rows.append(Row(f"pull, {case} [N]", force, reference=(whole, whole)))
+    name = f"pull, {case}: friction on the sides [N]"
+    results.rows.append(Row(name, force - carried, reference=(sides, sides)))
 
 
 def plot(results: Results) -> Figure:

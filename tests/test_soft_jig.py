@@ -10,6 +10,7 @@ from jig_rig import Rig
 from numpy.typing import NDArray
 
 from cell.soft_jig import JigParameters, JigState
+from cell.soft_jig.parameters import VacuumParameters
 
 # A short press that still reaches the drive's limit of 20 N.
 FAST = {"speed": 0.04, "duration": 0.8}
@@ -165,3 +166,9 @@ def test_inflating_wipes_the_imprint(held: Held) -> None:
     bed = held.rig.jig.bed
     assert bed.heights.max() == pytest.approx(JigParameters().bag.cap_height)
     assert held.rig.jig.state is JigState.INFLATED
+
+
+def test_imprint_closes_with_the_vacuum() -> None:
+    """Beads contract with about p^0.7: not at all where nothing is pumped out, half at 30 kPa."""
+    shares = [VacuumParameters(pressure=pressure).closing for pressure in (0.0, 30e3, 90e3)]
+    assert shares == pytest.approx([0.0, 0.463, 1.0], abs=1e-3)

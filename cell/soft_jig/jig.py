@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from contextlib import AbstractContextManager, nullcontext
+from dataclasses import replace
 from enum import Enum
 from itertools import chain
 from typing import Any
@@ -265,7 +266,7 @@ class SoftJig:
             X_JP, _ = self._motion_in_jig(context, X_WJ, body)
             lip = self.params.suction.lip
             holding.seals[name] = Seal.under(self.bed, samples.name, X_JP, lip)
-        self.bed.jam(self.params.vacuum.contraction)
+        self.bed.jam(self.params.vacuum.contraction * self.params.vacuum.closing)
         self.state = JigState.JAMMED
         self._forces = []
         self._mesh = self._mesh_with_imprint(context, X_WJ)
@@ -282,7 +283,9 @@ class SoftJig:
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
             hulls += self._bed_hulls(body, X_JP)
             lean = lean_of(X_JP.rotation())
-        return imprint_mesh(self.bed, self.params.jammed, hulls, lean)
+        jammed = self.params.jammed
+        squeezed = replace(jammed, squeeze=jammed.squeeze * self.params.vacuum.closing)
+        return imprint_mesh(self.bed, squeezed, hulls, lean)
 
     def _show_bed(self, root_context: Context) -> None:
         self._forces = []

@@ -123,13 +123,21 @@ class VacuumParameters:
         pressure: Confining pressure when pumped out [Pa]. [S] about 90 kPa.
         time_constant: First-order response [s]. [D] 0.25, range 0.23-0.70 for 30-10 L/min.
         jam_fraction: Part of the full pressure above which the bed counts as frozen. [A] 0.95.
-        contraction: Volumetric shrinkage on evacuation. [R] DEM 0.4 %; below 1 % in the literature.
+        contraction: Volumetric shrinkage on evacuation to 90 kPa. [R] DEM 0.4 %; below 1 % in the
+            literature.
+        contraction_exponent: Of the shrinkage over the vacuum. [R] DEM about 0.7.
     """
 
     pressure: float = 90e3
     time_constant: float = 0.25
     jam_fraction: float = 0.95
     contraction: float = 0.004
+    contraction_exponent: float = 0.7
+
+    @property
+    def closing(self) -> float:
+        """Return how far beads and imprint close, relative to that at 90 kPa."""
+        return float((self.pressure / FULL_VACUUM) ** self.contraction_exponent)
 
 
 @dataclass(frozen=True)
@@ -142,9 +150,10 @@ class JammedParameters:
             the DEM's 33 MPa). It goes with the square root of the confinement [R].
         soft_gradient: The same while not jammed, for hands that touch the bag [Pa/m]. [A] one
             tenth: stiffness of a packing goes with the square root of pressure [R].
-        squeeze: Offset g of the wall from the part's outline [m], negative squeezes. [R] DEM dome:
-            the dent closes by 0.05 mm in diameter on evacuation; [D] 0.4 % of volume is 0.13 % of
-            length, 0.023 mm of a 17.5 mm radius. Range 0 to -0.04 mm; in a rigid cup it opens.
+        squeeze: Offset g of the wall from the part's outline at 90 kPa [m], negative squeezes; it
+            goes with the contraction. [R] DEM dome: the dent closes by 0.05 mm in diameter; [D]
+            0.4 % of volume is 0.13 % of length, 0.023 mm of a 17.5 mm radius. Range 0 to -0.04 mm;
+            in a rigid cup it opens.
         friction: Membrane on metal. [R] 0.6-1.3; 0.9.
         dissipation: Hunt-Crossley [s/m]. [A] 5; 0-50 changes holding by 15 %.
         mesh_size: What the frozen bed's mesh scales with [m]. [A] numerical, 5 mm: half of it

@@ -63,7 +63,7 @@ class Observer:
         stage, root: As given.
         context: Context of the plant.
         recording: Whether a row is added to the log every `RECORD_PERIOD`.
-        log: Poses, and wrenches less their reading at `tare`.
+        log: Poses, and wrenches less their reading at the latest `tare`.
         latest: (12,) the latest of these wrenches, of wrist and force plate [N m, N].
     """
 
@@ -104,6 +104,10 @@ class Observer:
     def tare(self) -> None:
         """Take the present readings of both wrench sensors for zero."""
         self._tare = self._readings()
+
+    def tare_hand(self) -> None:
+        """Take the present reading of the hand's wrench sensor for zero."""
+        self._tare[:6] = self._readings()[:6]
 
     def step(self, steps: int, time: float) -> None:
         """Record, if it is time, after a step.

@@ -6,7 +6,7 @@ drags the part sideways or up at constant speed. Force and displacement are reco
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -213,8 +213,3 @@ class ElementRig:
         """How far the part's lowest point is below the apex of the inflated bag [m]."""
         low = (self.X_JP @ self._X_CP.inverse()).translation()[2]
         return self.params.bag.cap_height - float(low)
-
-
-def with_vacuum(params: JigParameters, pressure: float) -> JigParameters:
-    """Return the parameters with another final vacuum [Pa]."""
-    return replace(params, vacuum=replace(params.vacuum, pressure=pressure))

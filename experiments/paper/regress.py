@@ -58,6 +58,7 @@ TOLERANCES = (
     Tolerance("place_normal_peak_N", 0.5, 0.05, "one step of the press, 20 N in 10 mm"),
     Tolerance("displacement_m", 3e-3, 0.05, "half of what separates 63 mm from the 70 mm pushed"),
     Tolerance("push_shear_peak_N", 1.0, 0.15, "a peak of stick-slip, averaged over 10 ms"),
+    Tolerance("hand_force_peak_N", 2.0, 0.2, "the blow that sets the jig going, over 10 ms"),
     Tolerance("part_rotation_rad", 0.05, 0.15, "once it topples, where it ends is chance"),
 )
 

@@ -221,6 +221,7 @@ def _push(hand: Hand, push: Push, trial: Trial, watch: Watch) -> None:
     line = push_line(seen.stage, push, seen.X_WJ, seen.X_WP)
     hand.approach(line)
     hand.wait("ready", READY_TIME)
+    seen.tare_hand()  # In free air: when the trial began, a jaw may have touched the part.
     trial.before = seen.X_WJ
     watch("before", seen)
     hand.push(line)
