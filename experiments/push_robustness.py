@@ -26,6 +26,7 @@ from typing import Annotated, Any
 import numpy as np
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
@@ -212,7 +213,7 @@ def robustness_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 def displacement_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return how far the jig went in each variant [mm]; flipped outcomes are marked with *."""
     labels = list(rows[0]["outcome"])
-    table = Table("variant", *labels, title="Moved [mm]", title_justify="left")
+    table = Table("variant", *labels, title=escape("Moved [mm]"), title_justify="left")
     for row in rows:
         moved = [f"{1e3 * (row['displacement_m'][label] or 0.0):.0f}" for label in labels]
         marks = [

@@ -7,6 +7,7 @@ from types import TracebackType
 
 from rich import progress as bars
 from rich.console import Console
+from rich.markup import escape
 from rich.table import Table
 
 from experiments.assembly.run import StepResult
@@ -57,7 +58,7 @@ def result_table(steps: Sequence[StepResult]) -> Table:
     """Return one row per step, and below it each check that failed."""
     table = Table(title="Assembly", title_justify="left")
     for heading in ("step", "verdict", "simulated [s]", "CPU [s]", "outside of its limit"):
-        table.add_column(heading, justify="right" if "[s]" in heading else "left")
+        table.add_column(escape(heading), justify="right" if "[s]" in heading else "left")
     for step in steps:
         failed = [
             f"{check.quantity}: "

@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 from scipy.stats import t as student
 from scipy.stats import ttest_ind
@@ -218,26 +219,24 @@ def _meaning(result: CaseResult) -> str:
 
 
 def case_table(command: str, results: Sequence[CaseResult]) -> Table:
-    """Return the table a person reads: outcomes beside the paper's."""
-    push = command == "push"
+    """Return the table a person reads, no wider than 80 characters."""
     table = Table(title=f"Experiment: {command}", title_justify="left")
-    columns = PUSH_COLUMNS if push else PLACE_COLUMNS
+    columns = PUSH_COLUMNS if command == "push" else PLACE_COLUMNS
     quantities, headings, scales = zip(*columns, strict=True)
-    for heading in ("case", "hits", "paper", "agrees", *headings, "CPU [s]"):
-        justify = "left" if heading in ("case", "paper") else "right"
+    for heading in ("case", "hits", "agrees", *map(escape, headings), escape("CPU [s]")):
+        justify = "left" if heading == "case" else "right"
         table.add_column(heading, justify=justify, no_wrap=True)
     for result in results:
         values = [scale * result.values(q) for q, scale in zip(quantities, scales, strict=True)]
-        shown = [_spread(v) for v in values]
         cpu = np.mean([trial.trial.cpu_seconds for trial in result.trials])
         counts = f"{result.successes}/{len(result.trials)}"
         agrees = "yes" if result.agrees else "no"
-        table.add_row(result.case.label, counts, result.case.expected, agrees, *shown, f"{cpu:.0f}")
+        table.add_row(result.case.label, counts, agrees, *map(_spread, values), f"{cpu:.0f}")
     return table
 
 
 def _spread(values: np.ndarray) -> str:
-    """Return mean and standard deviation of some values, as far as there are any."""
-    if len(values) < 2:
-        return "".join(f"{value:.1f}" for value in values)
+    """Return mean and standard deviation of some values, if any, unless all are equal."""
+    if len(values) < 2 or np.ptp(values) == 0:
+        return "".join(f"{value:.1f}" for value in values[:1])
     return f"{values.mean():.1f} ± {values.std(ddof=1):.1f}"

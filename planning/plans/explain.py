@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable
 
 import numpy as np
+from rich.markup import escape
 from rich.table import Table
 
 from planning.fixing.algorithm import READING, FixingStep
@@ -20,7 +21,7 @@ def step_table(plan: FixingPlan) -> Table:
     table = Table(title=f"{plan.product}: {', '.join(plan.order)}", title_justify="left")
     for heading in ("step", "incoming", *DIRECTIONS, "posture / fixed", "up"):
         table.add_column(heading)
-    table.add_column("CoG height [mm]", justify="right")
+    table.add_column(escape("CoG height [mm]"), justify="right")
     for number, step in enumerate(plan.steps, start=1):
         table.add_row(str(number), *_step_cells(step))
     return table
