@@ -89,6 +89,7 @@ def _soft(results: Results) -> None:
             ours = float(np.interp(depth / 1e3, *curve.T)) / 1e3
             name = f"soft punch {depth} mm, {kind} [kPa]"
             results.rows.append(Row(name, ours, reference=(pressure, pressure)))
+    curve, bed = punch()
     kept = residual(bed, float(curve[-1, 0]))
     back = reference()["spring_back_mm"] / 15
     results.rows.append(Row("imprint left of 15 mm [-]", kept, reference=(1 - back, 1 - back)))

@@ -1,4 +1,4 @@
-"""How robust the push outcomes are: to every free parameter, and to how they are computed.
+"""How robust the push outcomes are: to thirteen free numbers, and to how they are computed.
 
     python -m experiments.push_robustness --samples 20 --workers 2 --out out/robustness
     python -m experiments.push_robustness --samples 0 --one-by-one
@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import multiprocessing
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -36,7 +36,7 @@ from cell.settings.config import CellConfig
 from experiments.cli.common import BadUsage, Common
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases
-from experiments.paper.place_push import cases_of
+from experiments.paper.place_push import ATMOSPHERE, cases_of, with_pressure
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import versions
 
@@ -44,7 +44,7 @@ from experiments.reporting.provenance import versions
 PARAMETERS = {
     "push.jig_mass": "1 to 3 kg [A]",
     "push.base_friction": "0.3 to 0.6 [A]",
-    "push.speed": "0.22 to 0.28 m/s [D]",
+    "push.speed": "0.22 to 0.29 m/s [D]",
     "push.acceleration": "any [A]",
     "push.start_gap": "0.5 to 5 mm [A]",
     "push.height_fraction": "0.5 to 0.7 [A]",
@@ -53,9 +53,11 @@ PARAMETERS = {
     "jig.soil.membrane_modulus": "100 to 150 N/m [R]",
     "jig.soil.friction_angle": "22 to 28 deg [R]",
     "jig.jammed.friction": "0.6 to 1.3 [R]",
-    "jig.jammed.pressure_gradient": "1e8 to 1e9 Pa/m [A]",
+    "jig.jammed.pressure_gradient": "2e8 to 1.3e9 Pa/m [D]",
     "jig.suction.strength": "0 to 90 kPa [A]",
 }
+# Draws stop at what is possible.
+LARGEST = {"jig.vacuum.pressure": ATMOSPHERE, "push.height_fraction": 1.0}
 AS_CONFIGURED = "as configured"
 GRAVITY = 9.81  # [m/s2]
 NUMERICS = {
@@ -125,7 +127,10 @@ def value_at(config: CellConfig, path: str) -> float:
 
 def scaled(config: CellConfig, factors: Mapping[str, float]) -> Changes:
     """Return the numbers of the configuration at some paths, multiplied."""
-    return {path: value_at(config, path) * factor for path, factor in factors.items()}
+    return {
+        path: min(value_at(config, path) * factor, LARGEST.get(path, np.inf))
+        for path, factor in factors.items()
+    }
 
 
 def coasting_speed(config: CellConfig) -> float:
@@ -155,17 +160,22 @@ def variants(options: Options, config: CellConfig) -> list[Variant]:
     return found
 
 
-def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
-    """Run one trial of every case with a variant's numbers; return its row."""
+def config_of(options: Options, variant: Variant) -> CellConfig:
+    """Return a variant's configuration; raises `CellError` if it is impossible."""
     changes = [f"{path}={value}" for path, value in variant.changes.items()]
     common = replace(options.common, overrides=(*options.common.overrides, *changes))
+    return with_pressure(common.load_config(), None)
+
+
+def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
+    """Run one trial of every case with a variant's numbers; return its row."""
     done = run_cases(
         cases_of("push", options.case),
         product=load_product("motor_unit"),
-        config=common.load_config(),
+        config=config_of(options, variant),
         bed=variant.bed,
         trials=1,
-        seed=common.seed,
+        seed=options.common.seed,
     )
     outcomes = {result.case.label: result for result, _ in done}
     return {
@@ -178,17 +188,18 @@ def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
     }
 
 
-def run_variants(options: Options, config: CellConfig, console: Console) -> list[dict[str, Any]]:
-    """Run every variant, several at a time; print which cases each of them flips."""
-    wanted = variants(options, config)
-    rows: list[dict[str, Any]] = []
+def run_variants(
+    options: Options, wanted: Sequence[Variant], console: Console
+) -> Iterator[dict[str, Any]]:
+    """Run variants, several at a time; print which cases each of them flips, and yield its row."""
+    base: dict[str, Any] | None = None
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(options.workers, spawn) as pool:
         for row in pool.map(run_variant, [options] * len(wanted), wanted):
-            rows.append(row)
-            flipped = ", ".join(flips(row, rows[0])) or "none"
+            base = row if base is None else base
+            flipped = ", ".join(flips(row, base)) or "none"
             console.print(f"{row['variant']}: flips {flipped}", markup=False)
-    return rows
+            yield row
 
 
 def flips(row: Mapping[str, Any], base: Mapping[str, Any]) -> list[str]:
@@ -247,10 +258,15 @@ def _run(options: Options) -> int:
         console.print(f"{path} = {value_at(config, path):g} (range {source})", markup=False)
     speed = coasting_speed(config)
     console.print(f"Speed for the paper's 78.2 mm: {speed:.3f} m/s", markup=False)
+    wanted = variants(options, config)
+    for variant in wanted:
+        config_of(options, variant)  # Impossible numbers are refused before hours of work.
+    rows: list[dict[str, Any]] = []
+    result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
     with output_folder(Path(options.common.out)) as out:
-        rows = run_variants(options, config, console)
-        result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
-        write_json(out / "result.json", result | {"versions": versions()})
+        for row in run_variants(options, wanted, console):
+            rows.append(row)
+            write_json(out / "result.json", result | {"versions": versions()})
     console.print(displacement_table(rows))
     if options.samples:
         console.print(robustness_table(rows))

@@ -82,6 +82,14 @@ def test_pin_is_pulled_out_freely() -> None:
     assert torque == pytest.approx(np.zeros(3), abs=1e-9)
 
 
+def test_pin_that_has_left_the_beads_meets_nothing() -> None:
+    """Pulled out by its 10 mm and moved aside; half out, half of it still holds."""
+    force, _ = pin().push(at(5e-3, 11e-3), STRENGTH)
+    assert force == pytest.approx(np.zeros(3), abs=1e-12)
+    whole, half = (pin().push(at(0.1e-3, z), STRENGTH)[0][0] for z in (0.0, 5e-3))
+    assert half == pytest.approx(whole / 2, rel=0.2)
+
+
 def test_light_part_gets_softer_springs() -> None:
     """An explicit step of 1 ms carries less stiffness on 1 g than the beads have."""
     light = pin(inertia=np.diag([1e-8, 1e-8, 1e-8, 1e-3, 1e-3, 1e-3]))

@@ -5,11 +5,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 
 from cell import CellConfig
+from cell.running.log import Log
 from experiments.cli.main import main
 from experiments.paper.case_results import Experiment, by_outcome, verdict
-from experiments.paper.cases import Case, CaseResult, TrialResult
+from experiments.paper.cases import Case, CaseResult, TrialResult, judged
 from experiments.paper.place_push import run_experiment
 from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.regress import SUITES, TOLERANCES, drifts
@@ -38,6 +40,9 @@ def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture)
         (["push", "--set", "jig.vacuum.pressure=9e9"], "between 0"),
         (["push", "--set", "push.jig_mass=0.2"], "push.jig_mass"),
         (["place", "--set", "jig.bag.cap_height=0.005"], "wide"),
+        (["place", "--set", "jig.bag.cap_height=0.2"], "cap_height"),
+        (["place", "--set", "jig.bag.cell=0"], "'jig.bag.cell' must be > 0"),
+        (["place", "--set", "jig.vacuum.jam_fraction=1"], "jam_fraction"),
         (["place", "--hand", "robot", "--bed", "rigid"], "--bed rigid is for --hand rig"),
         (["push", "--hand", "foot"], "robot"),
         (["regress", "--suite", "huge"], "huge"),
@@ -47,6 +52,25 @@ def test_bad_input_is_one_line_and_writes_nothing(
     arguments: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
     assert said in refused(arguments, tmp_path, capsys)
+
+
+def test_trial_that_failed_before_anything_was_recorded_is_a_verdict() -> None:
+    trial = Trial(planned=RigidTransform(), failure=("pick: lift", "lost the part"))
+    trial.log = Log().arrays()
+    result = judged(Case(POSTURES["motor/P2"]), trial)
+    assert not result.success
+    assert result.measured == {}
+
+
+def test_diverged_trial_can_be_written() -> None:
+    """What is not finite is left out."""
+    trial = Trial(
+        planned=RigidTransform(), held=RigidTransform(), placed=RigidTransform([0, 0, np.nan])
+    )
+    trial.failure = ("push", "the state is not finite")
+    result = judged(Case(POSTURES["motor/P2"]), trial)
+    assert not result.success
+    assert np.isfinite(list(result.measured.values())).all()
 
 
 def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:

@@ -9,6 +9,7 @@ from experiments.push_robustness import (
     PARAMETERS,
     Options,
     coasting_speed,
+    config_of,
     flips,
     main,
     scaled,
@@ -45,6 +46,14 @@ def test_every_parameter_is_a_setting_that_can_be_scaled(path: str) -> None:
 @pytest.mark.parametrize("changes", [*NUMERICS.values(), *CONTROLS.values()], ids=str)
 def test_every_named_variant_is_a_valid_configuration(changes: dict) -> None:
     assert CellConfig.load("default", changes) != CellConfig()
+
+
+def test_wide_draws_stop_at_what_is_possible() -> None:
+    options = Options(samples=20, spread=0.7, one_by_one=True)
+    found = variants(options, CellConfig())
+    pressures = [config_of(options, variant).jig.vacuum.pressure for variant in found]
+    assert max(pressures) == pytest.approx(101.325e3)
+    assert min(pressures) < 40e3
 
 
 def test_controls_end_with_the_rigid_block() -> None:

@@ -134,5 +134,7 @@ def test_robot_stands_the_motor_on_the_jig() -> None:
     # The press ends at 20 N under the hand; the force plate's reading is averaged over 10 ms.
     assert 18 < result.measured["place_normal_peak_N"] < 24
     assert tilt_between(trial.planned, trial.held) < np.deg2rad(1.0)
-    assert {"pick: lift", "press", "jam", "settle"} <= set(trial.log["phase_name"])
+    phases = list(trial.log["phase_name"])
+    assert {"pick: lift", "press", "stop", "jam", "settle"} <= set(phases)
+    assert not any(phase.startswith("pick") for phase in phases[phases.index("press") :])
     assert trial.log["time"][0] > trial.log["phase_start"][6]  # Nothing is recorded of the fetch.

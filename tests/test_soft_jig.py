@@ -6,10 +6,12 @@ from dataclasses import dataclass
 
 import numpy as np
 import pytest
+import trimesh
 from jig_rig import Rig
 from numpy.typing import NDArray
 
-from cell.soft_jig import JigParameters, JigState
+from cell.soft_jig import JigParameters, JigState, SurfaceSamples
+from cell.soft_jig.jig import NoBedContact
 from cell.soft_jig.parameters import VacuumParameters
 
 # A short press that still reaches the drive's limit of 20 N.
@@ -166,6 +168,15 @@ def test_inflating_wipes_the_imprint(held: Held) -> None:
     bed = held.rig.jig.bed
     assert bed.heights.max() == pytest.approx(JigParameters().bag.cap_height)
     assert held.rig.jig.state is JigState.INFLATED
+
+
+def test_part_without_a_surface_for_the_bed_is_refused(held: Held) -> None:
+    """It would fall through the frozen bed."""
+    carriage = held.rig.plant.GetBodyByName("carriage")
+    with pytest.raises(NoBedContact, match="carriage.*bed_"):
+        held.rig.jig.press_with(
+            carriage, SurfaceSamples.of("carriage", trimesh.creation.box((0.01, 0.01, 0.01)))
+        )
 
 
 def test_imprint_closes_with_the_vacuum() -> None:

@@ -102,7 +102,8 @@ def setting_of(section: Any, info: Field) -> Setting:
     """Return what is known about a field.
 
     For a field that is no `setting` the meaning is read from the class docstring, and a number
-    keeps the sign of its default: all of them are physical quantities with one meaningful sign.
+    keeps the sign of its default: all of them are physical quantities with one meaningful sign. A
+    field whose metadata say "positive" must not be zero.
     """
     if "setting" in info.metadata:
         return info.metadata["setting"]
@@ -114,6 +115,8 @@ def setting_of(section: Any, info: Field) -> Setting:
         return Setting(unit="", meaning=meaning)
     if default < 0:
         return Setting(unit="", meaning=meaning, at_most=0.0)
+    if info.metadata.get("positive"):
+        return Setting(unit="", meaning=meaning, above=0.0)
     return Setting(unit="", meaning=meaning, at_least=0.0)
 
 

@@ -64,10 +64,11 @@ class Bed:
         self.heights = self._dome.copy()
         self.covered = np.zeros(self.heights.shape, dtype=bool)
         self._shrinkage = np.zeros_like(self.heights)
-        self._settled = self.heights  # When the collar was raised last.
+        self._settled = self.heights.copy()  # When the collar was raised last.
         self.ledger = Ledger()
         self._traction = np.zeros((self.heights.size, 2))
         self._pressure = np.zeros(self.heights.size)
+        self._touched: dict[str, NDArray[np.int64]] = {}  # Cells under each part.
         self._carried: dict[str, Carried] = {}
         self._footprints = Footprints(self.axis, self.bag.cell, self.active)
         self._ceilings: dict[str, Contact] = {}  # Undersides over the bed in the latest step.
@@ -166,7 +167,8 @@ class Bed:
         if inertia is not None:
             rising = self._rising(springs, carried, inertia, V, dt)
         pressure = self._sink(springs, rising, dt)
-        traction = self._drag(springs, pressure, velocity[:, :2], dt)
+        sprung, traction = self._drag(springs, pressure, velocity[:, :2], dt)
+        self._remember(samples.name, cells, pressure, sprung)
         force = np.column_stack([traction, pressure]) * area[:, None]
         moment = arm.T @ force
         torque = np.array([moment[k - 2, k - 1] - moment[k - 1, k - 2] for k in range(3)])
@@ -206,22 +208,31 @@ class Bed:
         least = -max(float(latest @ springs.areas / springs.areas.sum()), 0.0)
         up, down = np.maximum(rising, 0.0), np.maximum(-rising, 0.0)
         damped = modulus * (elastic - soil.recovery_time * up) + soil.damping * down
-        pressure = np.maximum(damped, least)
-        self._pressure[:] = 0.0
-        self._pressure[cells] = pressure
-        return pressure
+        return np.maximum(damped, least)
 
-    def _drag(self, springs: Springs, pressure: Array, slip: Array, dt: float) -> Array:
-        """Return the membrane's friction per point (m, 2) [Pa]: a spring that slips (Coulomb)."""
+    def _drag(
+        self, springs: Springs, pressure: Array, slip: Array, dt: float
+    ) -> tuple[Array, Array]:
+        """Return the membrane's friction per point (m, 2) [Pa]: a spring that slips (Coulomb).
+
+        First that of the spring alone, then with its damper.
+        """
         soil, cells = self.soil, springs.cells
         stretched = springs.modulus * soil.shear_stiffness / soil.stiffness * dt * slip
         trial = self._traction[cells] - stretched
         size = np.sqrt(np.einsum("ij,ij->i", trial, trial))
         limit = soil.surface_friction * np.maximum(pressure, 0.0)
         trial *= np.minimum(1.0, limit / np.maximum(size, 1e-12))[:, None]
-        self._traction[:] = 0.0  # A cell that lost contact forgets its traction.
-        self._traction[cells] = trial
-        return trial - soil.damping * slip * (limit > 0)[:, None]
+        return trial, trial - soil.damping * slip * (limit > 0)[:, None]
+
+    def _remember(
+        self, name: str, cells: NDArray[np.int64], pressure: Array, traction: Array
+    ) -> None:
+        """Keep what is under a part; a cell that it has left forgets."""
+        before = self._touched.get(name, cells)
+        self._traction[before], self._pressure[before] = 0.0, 0.0
+        self._traction[cells], self._pressure[cells] = traction, pressure
+        self._touched[name] = cells
 
     # The slow part: collar, stretch, yield pressure.
 
@@ -325,9 +336,17 @@ class Bed:
         """
         _, z, _, cells = self._footprints.under(X_JP, samples)
         heights = self.heights.reshape(-1)
-        before = heights.sum()
+        before = heights.copy()
         np.minimum.at(heights, cells, np.maximum(z, self.bag.floor))
-        self._displace(before, heights)
+        self._displace(before.sum(), heights)
+        # What had shrunk there comes back beside the part, not under it.
+        pushed = (heights < before).reshape(self.heights.shape)
+        self.ledger.waiting += float(self._shrinkage[pushed].sum()) * self.bag.cell**2
+        self._shrinkage[pushed] = 0.0
+
+    def forget(self, name: str) -> None:
+        """Forget where the underside of a part was, by the name of its samples."""
+        self._ceilings.pop(name, None)
 
     def unjam(self) -> None:
         """Let air in again: the shrinkage goes back, the imprint stays."""
@@ -345,6 +364,7 @@ class Bed:
             "covered": self.covered.copy(),
             "traction": self._traction.copy(),
             "pressure": self._pressure.copy(),
+            "touched": {name: cells.copy() for name, cells in self._touched.items()},
             "carried": {name: carried.row() for name, carried in self._carried.items()},
             "shrinkage": self._shrinkage.copy(),
             "yield_pressure": self.yield_pressure.copy(),
@@ -361,6 +381,7 @@ class Bed:
         self.covered = state["covered"].copy()
         self._traction = state["traction"].copy()
         self._pressure = state["pressure"].copy()
+        self._touched = {k: cells.copy() for k, cells in state.get("touched", {}).items()}
         self._carried = {k: Carried.from_row(row) for k, row in state.get("carried", {}).items()}
         self._shrinkage = state["shrinkage"].copy()
         self.yield_pressure = state["yield_pressure"].copy()

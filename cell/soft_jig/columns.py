@@ -22,6 +22,8 @@ Triangle = tuple[int, int, int]
 
 # Heights closer than this are the same node [m].
 SAME_HEIGHT = 2e-5
+# Twice the area over which a face that looks up is more than a wall [m2].
+FLAT = 1e-10
 # From this many corners on, a face is round and gets a triangle in its middle.
 MANY = 16
 # How far the center of a smaller face's fan is moved from the middle towards its first corner.
@@ -66,6 +68,19 @@ class TetMesh:
             inside[near[within]] = True
             near = near[~within]
         return inside
+
+    def top_at(self, xy: Array) -> Array:
+        """Return the height (k,) of the surface over (k, 2) points; -inf beside the mesh [m]."""
+        corners = self.vertices[self.boundary()]
+        top = np.full(len(xy), -np.inf)
+        for a, b, c in corners:
+            sides = np.column_stack([b - a, c - a])[:2]
+            if np.linalg.det(sides) > FLAT:
+                u, v = np.linalg.solve(sides, (xy - a[:2]).T)
+                inside = (u >= 0) & (v >= 0) & (u + v <= 1)
+                height = a[2] + u * (b - a)[2] + v * (c - a)[2]
+                top = np.where(inside, np.maximum(top, height), top)
+        return top
 
     def largest_depth(self) -> float:
         """Return the largest distance of a vertex from the surface [m].

@@ -53,7 +53,8 @@ def imprint_mesh(
 
     A part that leans is meshed in coordinates in which it stands upright (`LeaningBed`), unless it
     stands on one flat body. Where the contact is in separate patches, only the largest is a floor;
-    the bed's own surface passes over the others.
+    the bed's own surface passes over the others, and under a part so lightly pressed that it covers
+    no facet by half.
 
     Args:
         bed: The frozen bed.
@@ -73,6 +74,8 @@ def imprint_mesh(
         return _imprint(view, params, undersides, lean)
     view = LeaningBed(bed, lean, min(map(lowest, undersides)))
     undersides = touching_bodies(view, [view.upright(hull) for hull in hulls])
+    if not undersides:
+        return bed_mesh(bed, params)
     mesh = _imprint(view, params, undersides, np.zeros(2))
     return TetMesh(view.leaning(mesh.vertices), mesh.tetrahedra)
 
@@ -81,6 +84,8 @@ def _imprint(
     bed: LeaningBed, params: JammedParameters, undersides: Sequence[list[Facet]], lean: Array
 ) -> TetMesh:
     facets = touching_facets(bed, undersides)
+    if not facets:
+        return bed_mesh(bed.bed, params)
     plane, cells = conforming_cells([facet.polygon for facet in facets], params.edge)
     patch = largest_patch(plane, cells)
     if len(patch) < len(cells):

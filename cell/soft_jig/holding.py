@@ -47,9 +47,11 @@ class Holding:
         self._patches: list[Patch] = []
 
     def let_go(self) -> None:
-        """Forget every body."""
+        """Forget every body and what has yielded."""
         self.seals.clear()
         self.pins.clear()
+        self.since_return = np.inf
+        self._patches = []
 
     def forget(self) -> None:
         """Look at every contact anew: the surface has changed."""

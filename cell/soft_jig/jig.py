@@ -24,6 +24,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import Context
 
+from cell.errors import CellError
 from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
@@ -50,6 +51,10 @@ Array = NDArray[np.float64]
 BED_PREFIX = "bed_"
 MEMBRANE = "soft_jig_membrane"  # Name of the visible surface.
 SILICONE_COLOR = (0.85, 0.75, 0.55, 1.0)
+
+
+class NoBedContact(CellError):
+    """A body without the collision geometry that the frozen bed holds."""
 
 
 class JigState(Enum):
@@ -136,6 +141,7 @@ class SoftJig:
         self.pressure = 0.0
         self._pumping = False
         self.state = JigState.INFLATED
+        self.bed.vacuum = 0.0
         self.bed.inflate()
         self._show_bed(root_context)
 
@@ -159,12 +165,24 @@ class SoftJig:
         self._pumping = True
 
     def press_with(self, body: RigidBody, samples: SurfaceSamples) -> None:
-        """Let the soft bed carry a body that has these surface samples (in the body frame)."""
+        """Let the soft bed carry a body that has these surface samples (in the body frame).
+
+        Raises:
+            NoBedContact: It has no geometry for the frozen bed, which would let it fall through.
+        """
+        ids = self._plant.GetCollisionGeometriesForBody(body)
+        if not any(self._name(geometry).startswith(BED_PREFIX) for geometry in ids):
+            raise NoBedContact(
+                f"'{body.scoped_name().get_full()}' cannot be held by the jig: "
+                f"none of its collision geometries is named '{BED_PREFIX}...'."
+            )
         self._pressing[body.scoped_name().get_full()] = (body, samples)
 
     def release(self, body: RigidBody) -> None:
         """Forget a body given to `press_with`."""
-        self._pressing.pop(body.scoped_name().get_full(), None)
+        _, samples = self._pressing.pop(body.scoped_name().get_full(), (body, None))
+        if samples is not None:
+            self.bed.forget(samples.name)
 
     @property
     def pressing(self) -> tuple[RigidBody, ...]:

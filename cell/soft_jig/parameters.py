@@ -8,11 +8,23 @@ run with glass beads in a dome of the same size.
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
+from cell.errors import CellError
+
 # Vacuum at which stiffness and suction of the frozen bed are stated [Pa]; [S] about 90 kPa.
 FULL_VACUUM = 90e3
+
+
+class BadJig(CellError):
+    """Numbers of the jig that contradict each other."""
+
+
+def positive(default: float) -> Any:
+    """Declare a field that must be above zero."""
+    return field(default=default, metadata={"positive": True})
 
 
 @dataclass(frozen=True)
@@ -28,11 +40,18 @@ class BagParameters:
             range 173e-6 to 184e-6.
     """
 
-    cap_radius: float = 0.060
-    cap_height: float = 0.0459
-    cell: float = 0.0015
-    floor: float = 0.003
-    bead_volume: float = 180e-6
+    cap_radius: float = positive(0.060)
+    cap_height: float = positive(0.0459)
+    cell: float = positive(0.0015)
+    floor: float = positive(0.003)
+    bead_volume: float = positive(180e-6)
+
+    def __post_init__(self) -> None:
+        if self.cap_height >= 2 * self.cap_radius:
+            raise BadJig(
+                f"The bag cannot be {self.cap_height:g} m high (jig.bag.cap_height): the sphere "
+                f"that it is cut from measures {2 * self.cap_radius:g} m (2 jig.bag.cap_radius)."
+            )
 
     @property
     def aperture_radius(self) -> float:
@@ -84,22 +103,22 @@ class SoilParameters:
         settle_period: Time between two redistributions of displaced volume [s]. [A]
     """
 
-    friction_angle: float = float(np.radians(25.0))
-    bead_weight: float = 1520.0 * 9.81
+    friction_angle: float = positive(float(np.radians(25.0)))
+    bead_weight: float = positive(1520.0 * 9.81)
     gravity_pressure: float = 250.0
     membrane_modulus: float = 150.0
-    initial_stretch: float = 1.02
-    stiffness: float = 3.0e7
+    initial_stretch: float = positive(1.02)
+    stiffness: float = positive(3.0e7)
     damping: float = 1.0e4
     recovery_time: float = 0.050
-    viscosity: float = 5.0e4
+    viscosity: float = positive(5.0e4)
     shear_stiffness: float = 3.0e7
     surface_friction: float = 0.9
-    collar_place: float = 0.016
+    collar_place: float = positive(0.016)
     shoulder_share: float = 0.0
     shoulder_length: float = 0.33
     dilation_limit: float = 7.0e-6
-    dilation_scale: float = 6.6e-6
+    dilation_scale: float = positive(6.6e-6)
     packing_slack: float = 0.0
     settle_period: float = 0.010
 
@@ -129,10 +148,17 @@ class VacuumParameters:
     """
 
     pressure: float = 90e3
-    time_constant: float = 0.25
+    time_constant: float = positive(0.25)
     jam_fraction: float = 0.95
     contraction: float = 0.004
     contraction_exponent: float = 0.7
+
+    def __post_init__(self) -> None:
+        if not self.jam_fraction < 1:
+            raise BadJig(
+                f"The bag would never freeze at {self.jam_fraction:g} of its vacuum "
+                "(jig.vacuum.jam_fraction): it must be below 1."
+            )
 
     @property
     def closing(self) -> float:
@@ -161,18 +187,18 @@ class JammedParameters:
         strength: Factor on the beads' strength while frozen; infinity never yields. [A] 1; the
             formulas for smooth walls and floors are conservative, DEM walls are weaker.
         return_depth: Excess depth at which the surface is moved for good [m]. [A] numerical: until
-            then friction is too strong by what it carries, 19 % of the lateral strength.
+            then friction is too strong by what it carries, 30 % of the lateral strength.
         return_period: Least time between two such moves [s]. [A] numerical.
     """
 
-    pressure_gradient: float = 4.0e8
-    soft_gradient: float = 4.0e7
+    pressure_gradient: float = positive(4.0e8)
+    soft_gradient: float = positive(4.0e7)
     squeeze: float = -0.025e-3
     friction: float = 0.9
     dissipation: float = 5.0
-    mesh_size: float = 0.005
-    strength: float = 1.0
-    return_depth: float = 0.1e-3
+    mesh_size: float = positive(0.005)
+    strength: float = positive(1.0)
+    return_depth: float = positive(0.1e-3)
     return_period: float = 0.005
 
     @property
@@ -214,8 +240,8 @@ class SuctionParameters:
 
     enabled: bool = True
     strength: float = 12.0e3
-    reach: float = 1.0e-3
-    slip: float = 3.0e-3
+    reach: float = positive(1.0e-3)
+    slip: float = positive(3.0e-3)
     lip: float = 3.0e-3
 
     def pressure(self, vacuum: float) -> float:

@@ -4,7 +4,8 @@ The mesh conforms to a part's convex `bed_*` hulls. What sticks out of them into
 a motor's terminals, meets the bed here: each small piece of its real surface is a spring with a
 plastic slider against the beads that were around it when they froze, as in the p-y curves of piles.
 It pushes only, and where it has yielded a gap stays behind it. It has no friction: pulled straight
-out, a pin leaves freely, as the vented cylinders of the discrete-element reference do.
+out, a pin leaves freely, as the vented cylinders of the discrete-element reference do, and what has
+risen out of the beads meets nothing any more.
 
 The limit is that of a wall near the surface, 2 c sqrt(Kp). Clay flows around a pile deep down at
 9 c (Matlock 1970), three times as much, so that pins hold rather less here than they would.
@@ -31,7 +32,7 @@ SKIN = 1e-3
 NARROW = 3e-4
 # Points in one cube of this size are in the beads together, or not [m].
 CUBE = 5e-4
-_ARRAYS = ("p_PS", "p_JS", "normals", "areas", "yielded")
+_ARRAYS = ("p_PS", "p_JS", "normals", "areas", "cover", "yielded")
 
 
 @dataclass
@@ -43,6 +44,7 @@ class Pins:
         p_JS: (n, 3) the same points in J when the bed froze [m].
         normals: (n, 3) out of the part, in J, when the bed froze.
         areas: (n,) [m2].
+        cover: (n,) height of beads over the points when the bed froze [m].
         yielded: (n,) depth by which the beads gave way for good [m]; it only grows.
         modulus: Contact pressure per depth [Pa/m].
     """
@@ -51,6 +53,7 @@ class Pins:
     p_JS: Array
     normals: Array
     areas: Array
+    cover: Array
     yielded: Array
     modulus: float
 
@@ -81,7 +84,9 @@ class Pins:
         p_JS, normals, areas = p_JS[among], normals[among], samples.areas[among]
         if len(areas):
             modulus = min(modulus, largest_stiffness(inertia, p_JS - p_JP, areas, dt))
-        return Pins(samples.points[among], p_JS, normals, areas, np.zeros(len(areas)), modulus)
+        cover = mesh.top_at(p_JS[:, :2]) - p_JS[:, 2]
+        p_PS, unyielded = samples.points[among], np.zeros(len(areas))
+        return Pins(p_PS, p_JS, normals, areas, cover, unyielded, modulus)
 
     def push(self, X_JP: tuple[Array, Array], strength: Strength) -> tuple[Array, Array]:
         """Return the force (3,) [N] on the part and its torque (3,) [N m] about P, in J.
@@ -92,7 +97,9 @@ class Pins:
         """
         R_JP, p_JP = X_JP
         arm = self.p_PS @ R_JP.T
-        depth = np.einsum("ij,ij->i", arm + p_JP - self.p_JS, self.normals)
+        moved = arm + p_JP - self.p_JS
+        buried = moved[:, 2] < self.cover
+        depth = np.where(buried, np.einsum("ij,ij->i", moved, self.normals), 0.0)
         limit = strength.limit(self.normals)
         self.yielded = np.maximum(self.yielded, depth - limit / self.modulus)
         pressure = self.modulus * np.maximum(depth - self.yielded, 0.0)

@@ -6,7 +6,7 @@ Here the beads' strength is added in two steps.
 Every step, `relief` gives the part back what the contact pressure p has above the limit p_y: a
 force of (p_y - p) per area, opposite on the bed. Drake solves the elastic pressure implicitly and
 the relief is known from the step before, so the sum is p_y + k v dt: a Bingham body whose viscosity
-k dt (2.5e5 Pa s/m at 1 ms) lies in the range assumed for the creep of jammed beads, 1e5 to 1e6.
+k dt (4e5 Pa s/m at 1 ms) lies in the range assumed for the creep of jammed beads, 1e5 to 1e6.
 
 When the excess has grown to a depth that matters, `returned` moves the surface's vertices by it,
 once and for good: the plastic return. The elastic pressure then starts from p_y again, friction

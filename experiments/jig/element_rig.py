@@ -46,8 +46,15 @@ class Drag:
 
     @property
     def holding_force(self) -> float:
-        """Largest force once the part has moved by 0.05 mm, median over 5 steps [N]."""
-        moving = self.force[int(np.argmax(self.way > 0.05e-3)) :]
+        """Largest force once the part has moved by 0.05 mm, median over 5 steps [N].
+
+        Raises:
+            ValueError: It never moved: the spring is too soft for what holds it.
+        """
+        moved = np.flatnonzero(self.way > 0.05e-3)
+        if len(moved) == 0 or len(self.force) - moved[0] < 5:
+            raise ValueError(f"The part did not move under {self.force.max():.3g} N.")
+        moving = self.force[moved[0] :]
         smooth = np.median(np.lib.stride_tricks.sliding_window_view(moving, 5), axis=1)
         return float(smooth.max())
 

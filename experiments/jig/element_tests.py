@@ -123,10 +123,11 @@ def pull(depth: float, vacuum: float = 90e3, sealed: bool = False) -> Drag:
 def lateral_formula(depth: float, vacuum: float, sealed: bool) -> float:
     """Return the push [N] that overturns the cylinder: (W + p A) b + R d / 2 over the lever.
 
-    R is the passive wall over the part's width and depth (Rankine); b the radius.
+    R is the passive wall over the part's width and depth (Rankine); b the radius; A what is sucked
+    on in the reference, a little more than the end.
     """
     soil, radius = JigParameters().soil, CYLINDER.radius
     wall = Strength.of(soil, vacuum + soil.gravity_pressure).lateral * 2 * radius * depth
-    sucked = vacuum * np.pi * radius**2 if sealed else 0.0
+    sucked = vacuum * reference()["sealed_area_ratio"] * END if sealed else 0.0
     moment = (CYLINDER.mass * 9.81 + sucked) * radius + wall * depth / 2
     return float(moment / (PUSH_HEIGHT + depth))

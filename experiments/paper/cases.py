@@ -176,11 +176,15 @@ def _bound(watch: Callable[[Case, str, Observer], None], case: Case) -> Callable
 
 
 def judged(case: Case, trial: Trial) -> TrialResult:
-    """Return a trial with what was measured and whether it succeeded."""
+    """Return a trial with what was measured and whether it succeeded.
+
+    What is not finite, after a simulation has diverged, was not measured.
+    """
     measured = measure_place(trial)
     if case.push is None:
         success = place_succeeded(trial, measured)
     else:
         measured |= measure_push(trial)
         success = push_succeeded(measured)
-    return TrialResult(success, measured, trial.failure, trial)
+    finite = {name: value for name, value in measured.items() if np.isfinite(value)}
+    return TrialResult(success, finite, trial.failure, trial)

@@ -5,11 +5,15 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cell.running.phase import PhaseFailed
 from cell.trial.stage import Stage
 from cell.trial.stroke import Stroke
 from experiments.paper.postures import AXES, MM, Push
 from experiments.paper.reach import Fingers
 from planning.operations.push import PushLine
+
+# Least horizontal part of a unit direction that a push can follow: the part lies 84 deg askew.
+LEVEL = 0.1
 
 
 def push_line(stage: Stage, push: Push, X_WJ: RigidTransform, X_WP: RigidTransform) -> PushLine:
@@ -24,16 +28,23 @@ def push_line(stage: Stage, push: Push, X_WJ: RigidTransform, X_WP: RigidTransfo
         push: Which push.
         X_WJ: Where the jig is, or is expected to be.
         X_WP: The same of the part.
+
+    Raises:
+        PhaseFailed: The hand would not meet the part, or the part lies on the side to be pushed.
     """
     numbers = stage.config.push
     foot, top = (X_WP @ (np.array(point) * MM) for point in (push.foot, push.top))
     direction = X_WP.rotation() @ AXES[push.along]
+    if np.hypot(*direction[:2]) < LEVEL:
+        raise PhaseFailed("approach", "the part lies on the side it is to be pushed from")
     direction = np.array([direction[0], direction[1], 0.0]) / np.hypot(*direction[:2])
     bed = bed_height(stage, X_WJ, foot[:2])
     low = max(foot[2], bed)
     height = max(low + numbers.height_fraction * (top[2] - low), bed + numbers.bed_clearance)
     fingers = Fingers.of_hand(stage)
     travel = fingers.travel(X_WP @ stage.samples.points.T, top[:2], height, direction)
+    if not np.isfinite(travel):
+        raise PhaseFailed("approach", "the closed hand would pass the part without a touch")
     p_WT = np.array([*top[:2], height + fingers.below_tip])
     p_WT += (travel - numbers.start_gap) * direction
     stroke = Stroke(numbers.stroke, numbers.speed, numbers.acceleration)

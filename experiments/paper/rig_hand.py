@@ -83,7 +83,11 @@ class RigHand:
         return self.simulation.observer
 
     def press(self) -> None:
-        """Grip, press, freeze: as the robot does it."""
+        """Grip, press, freeze.
+
+        The robot stops for 0.2 s between press and pump and pumps for 1.5 s at least; here the
+        pump starts at once, and the hand lets go soon after the bed has frozen.
+        """
         self._grip()
         simulation, force = self.simulation, self.simulation.rig.config.placement.press_force
         simulation.begin("press")

@@ -31,7 +31,7 @@ from planning.operations.placement import YAWS, anywhere
 from planning.operations.push import PushLine, approach, can_push, push
 from planning.operations.station import Station
 
-ON_JIG = ("press", "jam", "release", "clear", "retreat")  # Phases with the part on the jig.
+ON_JIG = "press"  # The first phase with the part on the jig.
 
 
 def presented(product: Product, posture: Posture) -> Product:
@@ -160,8 +160,8 @@ class RobotHand:
         """Go on with placing the part, until a phase has ended."""
         for phase in self._placing:
             name = phase.name.removeprefix(f"{self._name}: ")
-            if name in ON_JIG:
-                self.observer.recording = True
+            self.observer.recording |= name == ON_JIG
+            if self.observer.recording:
                 awake, start = frozenset([self._name]), (wake_jig, *phase.start)
                 phase = replace(phase, name=name, start=start, awake=awake)
             else:

@@ -54,7 +54,7 @@ def measure_place(trial: Trial) -> Measured:
     if trial.held is not None and trial.placed is not None:
         shift = trial.placed.translation() - trial.held.translation()
         measured["release_shift_m"] = float(np.linalg.norm(shift))
-    if trial.log:
+    if "time" in trial.log:
         time, normal, shear = plate_forces(trial)
         until = start_of(trial, "approach") or np.inf
         measured["place_normal_peak_N"] = float(normal[time < until].max())
@@ -64,7 +64,7 @@ def measure_place(trial: Trial) -> Measured:
 
 def measure_push(trial: Trial) -> Measured:
     """Return how far the jig went, how the part turned on it, and the forces."""
-    begun = start_of(trial, "push") if trial.log else None
+    begun = start_of(trial, "push") if "time" in trial.log else None
     if begun is None or trial.before is None:
         return {}
     time, normal, shear = plate_forces(trial)
