@@ -24,11 +24,11 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import Context
 
-from cell.errors import CellError
 from cell.soft_jig.bed import Bed
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
 from cell.soft_jig.drake_values import (
+    JigError,
     applied_force,
     drake_proximity,
     drake_shape,
@@ -51,10 +51,6 @@ Array = NDArray[np.float64]
 BED_PREFIX = "bed_"
 MEMBRANE = "soft_jig_membrane"  # Name of the visible surface.
 SILICONE_COLOR = (0.85, 0.75, 0.55, 1.0)
-
-
-class NoBedContact(CellError):
-    """A body without the collision geometry that the frozen bed holds."""
 
 
 class JigState(Enum):
@@ -168,11 +164,11 @@ class SoftJig:
         """Let the soft bed carry a body that has these surface samples (in the body frame).
 
         Raises:
-            NoBedContact: It has no geometry for the frozen bed, which would let it fall through.
+            JigError: It has no geometry for the frozen bed, which would let it fall through.
         """
         ids = self._plant.GetCollisionGeometriesForBody(body)
         if not any(self._name(geometry).startswith(BED_PREFIX) for geometry in ids):
-            raise NoBedContact(
+            raise JigError(
                 f"'{body.scoped_name().get_full()}' cannot be held by the jig: "
                 f"none of its collision geometries is named '{BED_PREFIX}...'."
             )
