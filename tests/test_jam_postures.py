@@ -79,14 +79,21 @@ def test_part_rests_in_the_imprint(held) -> None:
     assert np.average(np.array(depths) < 0.3e-3, weights=areas) > 0.9
 
 
-def test_only_the_motors_terminals_and_boss_are_pins(held) -> None:
-    """Standing, it has 106 mm2 of rear boss and 82 mm2 of terminals in the beads; else slivers."""
+def test_only_what_the_hulls_leave_out_is_a_pin(held) -> None:
+    """Standing, 97 mm2 of rear boss and 77 of terminals; lying, what touches beyond its ends."""
     rig, *_ = held
     (pins,) = rig.jig.holding.pins.values()
-    points = pins.p_PS
-    standing = rig.part.part.name == "motor" and bool(np.allclose(rig.part.up, (0, 0, 1)))
-    terminals = np.abs(np.hypot(points[:, 0], points[:, 1]) - 0.0112) < 0.0016
-    boss = np.hypot(points[:, 0], points[:, 1]) < 0.0077
-    assert pins.areas[boss].sum() == pytest.approx(106e-6 if standing else 0.0, abs=8e-6)
-    assert pins.areas[terminals].sum() == pytest.approx(82e-6 if standing else 0.0, abs=8e-6)
-    assert pins.areas[~(boss | terminals)].sum() < 6e-6
+    name, up = rig.part.part.name, rig.part.up
+    if name == "plate":
+        assert len(pins.areas) == 0
+        return
+    radius, z = np.hypot(pins.p_PS[:, 0], pins.p_PS[:, 1]), pins.p_PS[:, 2]
+    if up == (0, 0, 1):
+        assert pins.areas[radius < 0.0077].sum() == pytest.approx(97e-6, abs=8e-6)
+        assert pins.areas[np.abs(radius - 0.0112) < 0.0016].sum() == pytest.approx(77e-6, abs=8e-6)
+        assert np.all(z < -0.053)
+    else:
+        assert 10e-6 < pins.areas.sum() < 80e-6
+        assert np.all((z < -0.053) | (z > 0))
+    # Seen from above its slot is open.
+    assert pins.normals[:, 2].max() < 0.1

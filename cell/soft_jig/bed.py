@@ -47,7 +47,7 @@ class Bed:
     def __init__(self, bag: BagParameters, soil: SoilParameters) -> None:
         self.bag, self.soil = bag, soil
         half = int(np.ceil(bag.aperture_radius / bag.cell))
-        self.axis = np.arange(-half, half + 1) * bag.cell
+        self.axis = np.arange(-half, half + 1, dtype=np.float64) * bag.cell
         self.x, self.y = np.meshgrid(self.axis, self.axis, indexing="ij")
         self._dome = self._cap(np.hypot(self.x, self.y))
         self.active = self._dome > 0
@@ -111,8 +111,8 @@ class Bed:
         border is half in the imprint, and the part is up to `footprints.STAY` cells off the
         grid.
         """
-        beside = ndimage.distance_transform_edt(
-            self.covered, return_distances=False, return_indices=True
+        _, beside = map(
+            np.asarray, ndimage.distance_transform_edt(self.covered, return_indices=True) or ()
         )
         return self._interpolated(self.heights[tuple(beside)], xy)
 

@@ -17,7 +17,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.geometry import CollisionFilterDeclaration, GeometryId, GeometrySet, Role, SceneGraph
+from pydrake.geometry import ProximityProperties, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
@@ -25,15 +25,13 @@ from pydrake.multibody.tree import BodyIndex, RigidBody
 from pydrake.systems.framework import Context
 
 from cell.soft_jig.bed import Bed
+from cell.soft_jig.bed_geometry import BedGeometry
 from cell.soft_jig.columns import TetMesh
 from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
 from cell.soft_jig.drake_values import (
-    JigError,
     applied_force,
     drake_proximity,
-    drake_shape,
     force_row,
-    hull_vertices,
     inertia_in_jig,
     lean_of,
 )
@@ -42,15 +40,8 @@ from cell.soft_jig.parameters import FULL_VACUUM, JigParameters
 from cell.soft_jig.pins import Pins
 from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.suction import Seal
-from cell.soft_jig.visual import membrane_shape
 
 Array = NDArray[np.float64]
-
-# Collision geometries whose name starts like this touch the frozen bed; all others of the same
-# body do not.
-BED_PREFIX = "bed_"
-MEMBRANE = "soft_jig_membrane"  # Name of the visible surface.
-SILICONE_COLOR = (0.85, 0.75, 0.55, 1.0)
 
 
 class JigState(Enum):
@@ -81,8 +72,6 @@ class SoftJig:
         base_body: RigidBody,
         params: JigParameters,
         X_BJ: RigidTransform,
-        ids: tuple[GeometryId, GeometryId],
-        mesh: TetMesh,
     ) -> None:
         self.params = params
         self.bed = Bed(params.bag, params.soil)
@@ -90,14 +79,17 @@ class SoftJig:
         self.pressure = 0.0
         self.filters_lifted: Callable[[Context], AbstractContextManager[None]] = nullcontext
         self._pumping = False
-        self._plant, self._scene_graph = plant, scene_graph
+        self._plant = plant
         self._base, self._X_BJ = base_body, X_BJ
-        self._bed_id, self._visual_id = ids
-        self._mesh = mesh
+        self._mesh = bed_mesh(self.bed, params.jammed)
+        soft = self._properties()
+        self._geometry = BedGeometry(
+            plant, scene_graph, base_body, X_BJ, self.bed, (self._mesh, soft)
+        )
         self._pressing: dict[str, tuple[RigidBody, SurfaceSamples]] = {}
         self._forces: list[ExternallyAppliedSpatialForce] = []
         self._since_drawn = 0.0
-        self.holding = Holding(plant, scene_graph, self._bed_id, params)
+        self.holding = Holding(plant, scene_graph, self._geometry.contact_id, params)
 
     @staticmethod
     def add(
@@ -118,17 +110,7 @@ class SoftJig:
         """
         params = JigParameters() if params is None else params
         X_BJ = RigidTransform() if X_BJ is None else X_BJ
-        bed = Bed(params.bag, params.soil)
-        mesh = bed_mesh(bed, params.jammed)
-        soft = drake_proximity(mesh, params, params.jammed.soft_gradient)
-        bed_id = plant.RegisterCollisionGeometry(
-            base_body, X_BJ, drake_shape(mesh), "soft_jig_bed", soft
-        )
-        color = np.array(SILICONE_COLOR)
-        visual_id = plant.RegisterVisualGeometry(
-            base_body, X_BJ, membrane_shape(bed), MEMBRANE, color
-        )
-        return SoftJig(plant, scene_graph, base_body, params, X_BJ, (bed_id, visual_id), mesh)
+        return SoftJig(plant, scene_graph, base_body, params, X_BJ)
 
     # Commands.
 
@@ -166,12 +148,7 @@ class SoftJig:
         Raises:
             JigError: It has no geometry for the frozen bed, which would let it fall through.
         """
-        ids = self._plant.GetCollisionGeometriesForBody(body)
-        if not any(self._name(geometry).startswith(BED_PREFIX) for geometry in ids):
-            raise JigError(
-                f"'{body.scoped_name().get_full()}' cannot be held by the jig: "
-                f"none of its collision geometries is named '{BED_PREFIX}...'."
-            )
+        self._geometry.check_can_hold(body)
         self._pressing[body.scoped_name().get_full()] = (body, samples)
 
     def release(self, body: RigidBody) -> None:
@@ -295,7 +272,7 @@ class SoftJig:
         hulls, lean = [], np.zeros(2)
         for body, _ in self._pressing.values():
             X_JP = X_WJ.InvertAndCompose(self._plant.EvalBodyPoseInWorld(context, body))
-            hulls += self._bed_hulls(body, X_JP)
+            hulls += self._geometry.hulls(body, X_JP)
             lean = lean_of(X_JP.rotation())
         jammed = self.params.jammed
         squeezed = replace(jammed, squeeze=jammed.squeeze * self.params.vacuum.closing)
@@ -309,17 +286,14 @@ class SoftJig:
 
     def _install(self, root_context: Context) -> None:
         """Replace contact and visible geometry in the Context by the present mesh and surface."""
-        context = self._scene_graph.GetMyMutableContextFromRoot(root_context)
-        graph, source = self._scene_graph, self._plant.get_source_id()
         self.holding.forget()
-        properties = drake_proximity(self._mesh, self.params, self._gradient())
+        properties, frozen = self._properties(), self.state is JigState.JAMMED
         with self.filters_lifted(root_context):
-            # Removing the role first saves Drake from rebuilding the hydroelastic body twice.
-            graph.RemoveRole(context, source, self._bed_id, Role.kProximity)
-            graph.ChangeShape(context, source, self._bed_id, drake_shape(self._mesh))
-            graph.AssignRole(context, source, self._bed_id, properties)
-            self._filter(context)
-        self._draw(context)
+            self._geometry.replace(root_context, self._mesh, properties, self.pressing, frozen)
+        self._draw(root_context)
+
+    def _properties(self) -> ProximityProperties:
+        return drake_proximity(self._mesh, self.params, self._gradient())
 
     def _gradient(self) -> float:
         """Return the contact pressure per depth [Pa/m]; frozen, for the pump's full vacuum."""
@@ -330,53 +304,14 @@ class SoftJig:
         ratio = (self.params.vacuum.pressure + rest) / (FULL_VACUUM + rest)
         return jammed.pressure_gradient * float(np.sqrt(ratio))
 
-    def _filter(self, context: Context) -> None:
-        """Exclude the bed from its own base and from what must not touch it; a swap forgets it."""
-        others = GeometrySet(self._own_geometries() + self._untouched_geometries())
-        declaration = CollisionFilterDeclaration().ExcludeBetween(GeometrySet(self._bed_id), others)
-        self._scene_graph.collision_filter_manager(context).Apply(declaration)
-
-    def _own_geometries(self) -> list[GeometryId]:
-        bodies = self._plant.GetBodiesWeldedTo(self._base)
-        ids = [i for body in bodies for i in self._plant.GetCollisionGeometriesForBody(body)]
-        return [i for i in ids if i != self._bed_id]
-
-    def _untouched_geometries(self) -> list[GeometryId]:
-        """Return a part's geometries that the bed must not touch: while soft, all of them."""
-        pressing = {body.index() for body, _ in self._pressing.values()}
-        untouched = []
-        for index in map(BodyIndex, range(self._plant.num_bodies())):
-            body = self._plant.get_body(index)
-            ids = self._plant.GetCollisionGeometriesForBody(body)
-            touching = [i for i in ids if self._name(i).startswith(BED_PREFIX)]
-            if not touching and index not in pressing:
-                continue
-            frozen = self.state is JigState.JAMMED
-            untouched += [i for i in ids if not (frozen and i in touching)]
-        return untouched
-
-    def _name(self, geometry: GeometryId) -> str:
-        return self._scene_graph.model_inspector().GetName(geometry).split("::")[-1]
-
-    def _bed_hulls(self, body: RigidBody, X_JP: RigidTransform) -> list[Array]:
-        inspector = self._scene_graph.model_inspector()
-        hulls = []
-        for geometry in self._plant.GetCollisionGeometriesForBody(body):
-            if self._name(geometry).startswith(BED_PREFIX):
-                vertices = hull_vertices(inspector.GetShape(geometry), self._name(geometry))
-                X_JG = X_JP @ inspector.GetPoseInFrame(geometry)
-                hulls.append((X_JG @ vertices.T).T)
-        return hulls
-
     def _draw_if_due(self, root_context: Context, dt: float) -> None:
         self._since_drawn += dt
         if self._since_drawn >= self.params.visual_period:
-            self._draw(self._scene_graph.GetMyMutableContextFromRoot(root_context))
+            self._draw(root_context)
 
-    def _draw(self, context: Context) -> None:
+    def _draw(self, root_context: Context) -> None:
         self._since_drawn = 0.0
-        source = self._plant.get_source_id()
-        self._scene_graph.ChangeShape(context, source, self._visual_id, membrane_shape(self.bed))
+        self._geometry.draw(root_context, self.bed)
 
     # Saving.
 

@@ -30,6 +30,9 @@ SKIN = 1e-3
 # A gap between the part and its contact hulls that is narrower than twice this holds no bead: the
 # hulls' facets lie up to 0.2 mm inside of a round part [m].
 NARROW = 3e-4
+# A face that looks up by more than this has no beads over it (cosine of 84 deg): the part came from
+# above and left its slot open.
+UPWARD = 0.1
 # Points in one cube of this size are in the beads together, or not [m].
 CUBE = 5e-4
 _ARRAYS = ("p_PS", "p_JS", "normals", "areas", "cover", "yielded")
@@ -79,8 +82,9 @@ class Pins:
         """
         R_JP, p_JP = X_JP
         p_JS, normals = samples.points @ R_JP.T + p_JP, samples.normals @ R_JP.T
+        loaded = np.flatnonzero(normals[:, 2] < UPWARD)
         # Seen from within the part: a face that lies on the mesh is then outside of it.
-        among = _among(mesh, p_JS - SKIN * normals)
+        among = loaded[_among(mesh, (p_JS - SKIN * normals)[loaded])]
         p_JS, normals, areas = p_JS[among], normals[among], samples.areas[among]
         if len(areas):
             modulus = min(modulus, largest_stiffness(inertia, p_JS - p_JP, areas, dt))

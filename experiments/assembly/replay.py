@@ -22,7 +22,7 @@ from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
 from cell.errors import UnknownName
 from cell.running.builder import Cell
-from cell.soft_jig.jig import MEMBRANE, SILICONE_COLOR
+from cell.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
 from cell.soft_jig.visual import membrane_shape
 from experiments.reporting.output import write_text
 
