@@ -28,7 +28,7 @@ from cell.soft_jig.samples import SurfaceSamples
 from cell.soft_jig.stable import Carried, Springs, cross_matrix, largest_stiffness, normal_rows
 
 Array = NDArray[np.float64]
-Contact = tuple[NDArray[np.int64], Array]
+Ceiling = tuple[NDArray[np.int64], Array]  # Cells under a part and its height over them [m].
 
 _SCALARS = ("vacuum", "stretch", "tension", "_since_settled")
 
@@ -71,7 +71,7 @@ class Bed:
         self._touched: dict[str, NDArray[np.int64]] = {}  # Cells under each part.
         self._carried: dict[str, Carried] = {}
         self._footprints = Footprints(self.axis, self.bag.cell, self.active)
-        self._ceilings: dict[str, Contact] = {}  # Undersides over the bed in the latest step.
+        self._ceilings: dict[str, Ceiling] = {}  # Undersides over the bed in the latest step.
         self._step_done = False
         self._since_settled = 0.0
         self._update_yield()
@@ -255,7 +255,7 @@ class Bed:
     def _ceiling(self) -> Array:
         return self._lowest(self._ceilings.values())
 
-    def _lowest(self, undersides: Iterable[Contact]) -> Array:
+    def _lowest(self, undersides: Iterable[Ceiling]) -> Array:
         lowest = np.full(self.heights.size, np.inf)
         for cells, z in undersides:
             np.minimum.at(lowest, cells, z)

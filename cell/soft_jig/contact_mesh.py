@@ -18,7 +18,7 @@ from cell.soft_jig.leaning_bed import LeaningBed
 from cell.soft_jig.parameters import JammedParameters
 from cell.soft_jig.plane_cells import conforming_cells, largest_patch, outline
 from cell.soft_jig.polygons import Facet, offset_loop
-from cell.soft_jig.rings import edge_feet, floor_column, with_rings
+from cell.soft_jig.rings import Floor, floor_column, with_rings
 from cell.soft_jig.touching import (
     lowest,
     roof,
@@ -41,9 +41,10 @@ def bed_mesh(bed: Bed, params: JammedParameters) -> TetMesh:
     circle = 1.5 * params.ring * np.column_stack([np.cos(angle), np.sin(angle)])
     loop = list(range(CORNERS))
     tops = bed.height_at(circle)
-    floor = [floor_column(loop, circle, tops, float(bed.height_at(np.zeros((1, 2)))[0]), params)]
+    column = floor_column(loop, circle, tops, float(bed.height_at(np.zeros((1, 2)))[0]), params)
+    floor = Floor(circle, [column], loop)
     open_sky = np.full((CORNERS, 2), np.inf)
-    return with_rings(LeaningBed(bed), params, circle, floor, loop, open_sky, np.zeros(2))
+    return with_rings(LeaningBed(bed), params, floor, open_sky, np.zeros(2))
 
 
 def imprint_mesh(
@@ -94,9 +95,9 @@ def _imprint(
     loop = outline(cells)
     plane[loop] = offset_loop(plane[loop], params.squeeze)
     tops = [facet.height(plane[cell]) for facet, cell in zip(facets, cells, strict=True)]
-    floor = [
+    columns = [
         floor_column(cell, plane, top, float(top.mean()), params)
         for cell, top in zip(cells, tops, strict=True)
     ]
-    roofs = roof(plane[loop], edge_feet(floor, loop), undersides)
-    return with_rings(bed, params, plane, floor, loop, roofs, lean)
+    floor = Floor(plane, columns, loop)
+    return with_rings(bed, params, floor, roof(floor.inner, floor.feet, undersides), lean)

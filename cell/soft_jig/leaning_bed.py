@@ -43,7 +43,7 @@ class LeaningBed:
         return self.bed.bag
 
     @property
-    def axis(self) -> Array:
+    def middle(self) -> Array:
         """Return where the middle of the base plate is (2,) [m]."""
         return self.lean * self.level
 

@@ -19,7 +19,7 @@ def conforming_cells(polygons: Sequence[Array], longest: float) -> tuple[Array, 
     cells = [[_weld(points, xy) for xy in polygon] for polygon in polygons]
     cells = [_with_hanging_vertices(cell, points) for cell in cells]
     shared = {edge for cell in cells for edge in cell_edges(cell)}
-    split = [_split_outercell_edges(cell, points, shared, longest) for cell in cells]
+    split = [_split_outer_edges(cell, points, shared, longest) for cell in cells]
     return np.array(points), split
 
 
@@ -51,7 +51,7 @@ def _with_hanging_vertices(cell: list[int], points: list[Array]) -> list[int]:
     return full
 
 
-def _split_outercell_edges(
+def _split_outer_edges(
     cell: list[int], points: list[Array], shared: set[tuple[int, int]], longest: float
 ) -> list[int]:
     full = []

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +13,7 @@ from cell.soft_jig.leaning_bed import LeaningBed
 from cell.soft_jig.parameters import JammedParameters
 from cell.soft_jig.plane_cells import cell_edges
 from cell.soft_jig.polygons import offset_loop
+from cell.soft_jig.touching import LEAST_WALL
 
 Array = NDArray[np.float64]
 
@@ -21,8 +23,6 @@ RIM_HEIGHT = 0.002
 BESIDE = 0.002
 # Least angle between the directions in which neighbours of the outline look outwards [rad].
 LEAST_TURN = 0.02
-# Lower walls than this are left out [m].
-LEAST_WALL = 1e-3
 # Gap between the part and the foot of a wall [m]. With the part's edge inside the floor's columns
 # a standing can makes half as many contact polygons as with its edge in the wall, mostly slivers.
 FOOT_GAP = 6e-5
@@ -36,53 +36,63 @@ def floor_column(
     return Column(corners, tops, center_top, np.array([*plane[corners].mean(axis=0), height]))
 
 
-def edge_feet(floor: Sequence[Column], loop: Sequence[int]) -> Array:
-    """Return the floor's height at both ends of each edge of the outline (n, 2)."""
-    height = {
-        edge: (column.tops[k], column.tops[(k + 1) % len(column.tops)])
-        for column in floor
-        for k, edge in enumerate(cell_edges(column.corners))
-    }
-    return np.array([height[edge] for edge in cell_edges(list(loop))])
+@dataclass(frozen=True)
+class Floor:
+    """What is under the part.
+
+    Attributes:
+        plane: (n, 2) vertices.
+        columns: On them.
+        loop: Vertices of the outline, counter-clockwise.
+    """
+
+    plane: Array
+    columns: list[Column]
+    loop: list[int]
+
+    @property
+    def inner(self) -> Array:
+        """The outline (k, 2) [m]."""
+        return self.plane[self.loop]
+
+    @property
+    def feet(self) -> Array:
+        """Height at both ends of each edge of the outline (k, 2) [m]."""
+        height = {
+            edge: (column.tops[k], column.tops[(k + 1) % len(column.tops)])
+            for column in self.columns
+            for k, edge in enumerate(cell_edges(column.corners))
+        }
+        return np.array([height[edge] for edge in cell_edges(self.loop)])
 
 
 def with_rings(
-    bed: LeaningBed,
-    params: JammedParameters,
-    plane: Array,
-    floor: list[Column],
-    loop: list[int],
-    roof: Array,
-    lean: Array,
+    bed: LeaningBed, params: JammedParameters, floor: Floor, roof: Array, lean: Array
 ) -> TetMesh:
     """Surround the floor with a ring of columns at the wall and one out to the aperture.
 
     Args:
         bed: The frozen bed.
         params: Ring width, layer depth and squeeze.
-        plane: (n, 2) vertices of the floor.
-        floor: Its columns.
-        loop: Vertices of the outline, counter-clockwise.
+        floor: What is under the part.
         roof: (k, 2) how high the bed may stand at both ends of each edge of the outline [m].
         lean: (2,) horizontal shift per height of the part's walls.
 
     Raises:
         BadMesh: A column folds over.
     """
-    inner, away = plane[loop], _outward(plane[loop])
+    inner, away = floor.inner, _outward(floor.inner)
     circles = _circles(bed, inner, away, params)
-    foot = edge_feet(floor, loop)
-    tops = _ring_heights(bed, inner + away * BESIDE, circles, roof, foot)
-    points = np.concatenate([plane, *circles])
-    shift, rate = _closing(_wall_heights(floor, loop, tops[0]), params)
+    tops = _ring_heights(bed, inner + away * BESIDE, circles, roof, floor.feet)
+    points = np.concatenate([floor.plane, *circles])
+    shift, rate = _closing(_wall_heights(floor, tops[0]), params)
     outward = offset_loop(inner, 1.0) - inner
-    points[loop] += shift[:, None] * outward
+    points[floor.loop] += shift[:, None] * outward
     leans = np.tile(lean, (len(points), 1))
-    leans[loop] += rate[:, None] * outward
-    count = len(loop)
-    first, second = (list(range(k * count, (k + 1) * count)) for k in range(2))
-    rings = [loop, *([len(plane) + k for k in ring] for ring in (first, second))]
-    columns = [*floor, *_ring_columns(rings, points, tops, [foot, None], params)]
+    leans[floor.loop] += rate[:, None] * outward
+    added = len(floor.plane) + np.arange(2 * len(inner)).reshape(2, -1)
+    rings = [floor.loop, *added.tolist()]
+    columns = [*floor.columns, *_ring_columns(rings, points, tops, [floor.feet, None], params)]
     return ColumnMesh(points, columns, leans).build()
 
 
@@ -115,7 +125,7 @@ def _circles(
     """Return the plane vertices (n, 2) of the ring around the wall and of the one at the rim."""
     # The cap is steep at its edge: end a little inside, with an upright face.
     radius = bed.bag.aperture_radius - 2 * bed.bag.cell
-    to_edge = _distance_to_circle(inner - bed.axis, away, radius)
+    to_edge = _distance_to_circle(inner - bed.middle, away, radius)
     middle = inner + away * np.minimum(params.ring, to_edge / 2)[:, None]
     return middle, inner + away * to_edge[:, None]
 
@@ -154,12 +164,12 @@ def _at_both_ends(heights: Array) -> Array:
 # Columns.
 
 
-def _wall_heights(floor: Sequence[Column], loop: list[int], rim: Array) -> Array:
+def _wall_heights(floor: Floor, rim: Array) -> Array:
     """Return the height (n,) of the wall around one flat floor; 0 where it has a step."""
-    if len(floor) > 1:
-        return np.zeros(len(loop))
-    (column,) = floor
-    low = column.tops[[column.corners.index(corner) for corner in loop]]
+    if len(floor.columns) > 1:
+        return np.zeros(len(floor.loop))
+    (column,) = floor.columns
+    low = column.tops[[column.corners.index(corner) for corner in floor.loop]]
     sides = np.column_stack([rim[:, 0], np.roll(rim[:, 1], 1)]) - low[:, None]
     even = sides.min(axis=1) > sides.max(axis=1) / 2
     return np.where(even, sides.max(axis=1), 0.0)

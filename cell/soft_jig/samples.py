@@ -43,14 +43,12 @@ class SurfaceSamples:
         points: (n, 3) [m].
         normals: (n, 3) outward unit normals.
         areas: (n,) [m2].
-        spacing: Typical distance between neighbours [m].
     """
 
     name: str
     points: Array
     normals: Array
     areas: Array
-    spacing: float
 
     @staticmethod
     def of(name: str, mesh: trimesh.Trimesh, spacing: float = 0.001) -> SurfaceSamples:
@@ -61,9 +59,7 @@ class SurfaceSamples:
         doubled = np.linalg.norm(cross, axis=1)
         kept = doubled > 1e-14
         normals = cross[kept] / doubled[kept, None]
-        return SurfaceSamples(
-            name, triangles[kept].mean(axis=1), normals, doubled[kept] / 2, spacing
-        )
+        return SurfaceSamples(name, triangles[kept].mean(axis=1), normals, doubled[kept] / 2)
 
     def underside(self, R_JP: Array, bin_size: float) -> Underside:
         """Return one point per square bin of the surface seen from below, with its area.

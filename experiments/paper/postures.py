@@ -8,7 +8,6 @@ z = 0 (motor side) and 5 mm, and the foot at y = -33 .. -28 mm, reaching to z = 
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -175,9 +174,5 @@ def chosen(kind: str, table: dict, case: str | None) -> list:
     wanted = case.strip("/")
     found = [item for label, item in table.items() if (label + "/").startswith(wanted + "/")]
     if not found:
-        raise UnknownName(kind, case, _labels(table))
+        raise UnknownName(kind, case, list(table))
     return found
-
-
-def _labels(table: Iterable[str]) -> list[str]:
-    return list(table)
