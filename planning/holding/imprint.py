@@ -126,7 +126,7 @@ class Surface:
             own = self.samples
             down = np.flatnonzero(own.normals @ R_JA[2] < 0.0)
             points, normals = own.points[down] @ R_JA.T, own.normals[down] @ R_JA.T
-            turned = SurfaceSamples(own.name, points, normals, own.areas[down], SPACING)
+            turned = SurfaceSamples(own.name, points, normals, own.areas[down])
             self.below[key] = points, _one_per_cell(turned, cell)
         return self.below[key]
 
@@ -139,7 +139,7 @@ def samples_of(solid: Solid) -> Surface:
     points, faces = sampled[0], sampled[1]
     areas = np.full(count, mesh.area / count)
     normals = mesh.face_normals[faces]
-    return Surface(SurfaceSamples(solid.name, points, normals, areas, SPACING))
+    return Surface(SurfaceSamples(solid.name, points, normals, areas))
 
 
 def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
@@ -150,7 +150,7 @@ def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
     normals = np.column_stack([under.slopes, -np.ones(len(under.slopes))])
     lengths = np.linalg.norm(normals, axis=1)
     normals, areas = normals / lengths[:, None], under.areas * lengths
-    return SurfaceSamples(samples.name, under.points, normals, areas, SPACING)
+    return SurfaceSamples(samples.name, under.points, normals, areas)
 
 
 def press(
@@ -187,7 +187,7 @@ def _joined(parts: list[SurfaceSamples]) -> SurfaceSamples:
         np.concatenate([getattr(part, field) for part in parts])
         for field in ("points", "normals", "areas")
     )
-    return SurfaceSamples("body", points, normals, areas, SPACING)
+    return SurfaceSamples("body", points, normals, areas)
 
 
 @dataclass(frozen=True, eq=False)
