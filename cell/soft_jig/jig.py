@@ -165,6 +165,11 @@ class SoftJig:
     # Simulation.
 
     @property
+    def contact_mesh(self) -> TetMesh:
+        """Mesh of the bed's contact geometry, in J."""
+        return self._mesh
+
+    @property
     def applied_forces(self) -> list[ExternallyAppliedSpatialForce]:
         """Forces of the soft bed on the parts and on the base, for the plant's input port."""
         return self._forces
