@@ -1,6 +1,7 @@
 """The hand on its carriage: kinematics, paths, and one short trial on a rigid block."""
 
 import functools
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,6 +9,7 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell import CellConfig, load_product
 from cell.errors import BadPart, UnknownName
+from cell.running.phase import PhaseFailed
 from cell.soft_jig import SurfaceSamples
 from cell.trial.rig import HandPose, build_push_rig
 from cell.trial.rig_simulation import RigSimulation, smooth_path, stroke_path
@@ -115,6 +117,20 @@ def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
     # The pads lead, 8 mm before the tip frame; the gearbox has a radius of 18.4 mm.
     ahead = (line.X_WT.translation() - X_WP.translation()) @ line.direction
     assert ahead == pytest.approx(-0.0184 - 0.008 - config.push.start_gap, abs=3e-4)
+
+
+def test_push_that_cannot_be_started_is_a_verdict(motor_rig) -> None:
+    """A hand above the part would not meet it; a part that fell shows another side."""
+    push, X_WJ = PUSHES["motor/P2/a"], motor_rig.config.workcell.X_WJ
+    X_WP = planned_pose(motor_rig.part.part, push.posture, X_WJ, 0.0459)
+    pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
+    stage = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer.stage
+    config = replace(stage.config, push=replace(stage.config.push, bed_clearance=0.2))
+    with pytest.raises(PhaseFailed, match="without a touch"):
+        push_line(replace(stage, config=config), push, X_WJ, X_WP)
+    fallen = RotationMatrix.MakeYRotation(np.pi / 2) @ X_WP.rotation()
+    with pytest.raises(PhaseFailed, match="lies on the side"):
+        push_line(stage, push, X_WJ, RigidTransform(fallen, X_WP.translation()))
 
 
 def test_tilt_does_not_see_a_turn_about_the_vertical() -> None:
