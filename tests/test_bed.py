@@ -299,6 +299,18 @@ def test_second_part_leaves_the_first_ones_friction_alone() -> None:
     assert together == pytest.approx(alone, rel=0.05)
 
 
+def test_part_on_the_place_of_a_forgotten_one_starts_without_its_friction() -> None:
+    """A block that comes straight down where another was dragged away feels no sideways force."""
+    mesh = trimesh.creation.cylinder(radius=0.006, height=0.03, sections=32)
+    mesh.apply_translation([0, 0, 0.015])
+    bed, second = new_bed(), SurfaceSamples.of("second", mesh)
+    assert dragged(bed, SurfaceSamples.of("first", mesh), None) > 0.2
+    bed.forget("first")
+    force, _ = press_at(bed, second, [2e-4, 0, bed.bag.cap_height - 0.0031], [0, 0, -0.01])
+    assert force[2] > 0.1
+    assert force[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
+
+
 def test_bed_that_was_pushed_aside_does_not_come_back_under_the_part(punch: SurfaceSamples) -> None:
     """What had shrunk at the place rises beside the part; the balance is kept."""
     bed = new_bed()

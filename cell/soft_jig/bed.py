@@ -345,8 +345,10 @@ class Bed:
         self._shrinkage[pushed] = 0.0
 
     def forget(self, name: str) -> None:
-        """Forget where the underside of a part was, by the name of its samples."""
+        """Forget what a part pressed on, by the name of its samples."""
         self._ceilings.pop(name, None)
+        left = self._touched.pop(name, np.zeros(0, dtype=np.int64))
+        self._traction[left], self._pressure[left] = 0.0, 0.0
 
     def unjam(self) -> None:
         """Let air in again: the shrinkage goes back, the imprint stays."""
