@@ -20,11 +20,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from cell.builder import Cell, add_cell, build_cell
+    from cell.configuration.config import CellConfig
     from cell.products.loading import load_product
     from cell.products.product import Product
-    from cell.running.builder import Cell, add_cell, build_cell
-    from cell.running.simulation import Simulation
-    from cell.settings.config import CellConfig
+    from cell.simulation.simulation import Simulation
 
 __all__ = [
     "Cell",
@@ -38,12 +38,12 @@ __all__ = [
 
 # Looked up on first use: Drake takes a second that `cell.errors` and `--help` can do without.
 _HOME = {
-    "Cell": "cell.running.builder",
-    "CellConfig": "cell.settings.config",
+    "Cell": "cell.builder",
+    "CellConfig": "cell.configuration.config",
     "Product": "cell.products.product",
-    "Simulation": "cell.running.simulation",
-    "add_cell": "cell.running.builder",
-    "build_cell": "cell.running.builder",
+    "Simulation": "cell.simulation.simulation",
+    "add_cell": "cell.builder",
+    "build_cell": "cell.builder",
     "load_product": "cell.products.loading",
 }
 

@@ -22,7 +22,7 @@ import numpy as np
 import tyro
 
 from cell import load_product
-from cell.soft_jig import JigParameters
+from cell.fixtures.soft_jig import JigParameters
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
 from experiments.jig.specimens import Prism, ProductPart, Specimen

@@ -19,9 +19,9 @@ import tyro
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from cell.soft_jig import JigParameters
-from cell.soft_jig.parameters import FULL_VACUUM
-from cell.soft_jig.yielding import Strength
+from cell.fixtures.soft_jig import JigParameters
+from cell.fixtures.soft_jig.frozen.yielding import Strength
+from cell.fixtures.soft_jig.parameters import FULL_VACUUM
 from experiments.jig.element_rig import Drag
 from experiments.jig.element_tests import (
     CYLINDER,

@@ -26,16 +26,16 @@ from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.table import Table
 
+from cell.configuration.config import CellConfig
 from cell.products.loading import load_product
 from cell.products.product import Part, Product
-from cell.settings.config import CellConfig
-from planning.fixing.cache import cached_matrices
-from planning.fixing.contact import gap_matrix
-from planning.fixing.matrices import matrices_of
-from planning.fixing.solids import solids_of
-from planning.holding.candidate import Setup
-from planning.plans.planner import plan
-from planning.plans.rule import general_rule
+from planning.assembly_plan.planner import plan
+from planning.assembly_plan.rule import general_rule
+from planning.feasibility.cache import cached_matrices
+from planning.feasibility.contact import gap_matrix
+from planning.feasibility.matrices import matrices_of
+from planning.feasibility.solids import solids_of
+from planning.fixture_analysis.candidate import Setup
 
 STATION = 30.0  # [mm] Pitch of the stations of the bench assemblies.
 

@@ -30,9 +30,9 @@ from rich.markup import escape
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
+from cell.configuration.config import CellConfig
 from cell.errors import CellError
 from cell.products.loading import load_product
-from cell.settings.config import CellConfig
 from experiments.cli.common import BadUsage, Common
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases

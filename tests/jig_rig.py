@@ -36,7 +36,7 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from trimesh.exchange.obj import export_obj
 
-from cell.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
+from cell.fixtures.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
 
 # Motor of the product, in its own frame: gearbox front face at z = 0, +z along the shaft [M].
 CAN_RADIUS, CAN_REAR, GEARBOX_RADIUS, GEARBOX_REAR = 0.0174, -0.0534, 0.0184, -0.024

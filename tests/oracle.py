@@ -1,8 +1,8 @@
 """An independent answer to "does i, moved along +axis, hit k?": sweep i as a solid and intersect.
 
 The sweep is the union of i with a prism over each of its up-faces, and the intersection with k is
-taken by manifold3d's booleans. It shares no code with ``planning.fixing.interference`` and is 100
-times slower. The tolerance means the same in both: i starts that much further along, and the
+taken by manifold3d's booleans. It shares no code with ``planning.feasibility.interference`` and is
+100 times slower. The tolerance means the same in both: i starts that much further along, and the
 part of k that it sweeps must be wide enough, seen along the axis, for a disc of that radius.
 """
 

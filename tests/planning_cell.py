@@ -10,9 +10,9 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import QuaternionFloatingJoint
 
+from cell.configuration.config import ArmConfig
 from cell.machines.arm import Arm, add_arm
 from cell.paths import model_url, new_parser
-from cell.settings.config import ArmConfig
 from planning.motion.collision_model import CollisionModel
 
 P_WJ = [0.0, 0.15, 0.20]

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cell.configuration.config import CellConfig
 from cell.errors import BadOrder, CellError
 from cell.products.loading import load_product
 from cell.products.product import Fit, Product
-from cell.running.phase import Outcome, Phase, after
-from cell.running.simulation import Simulation
-from cell.running.state import State, read_state, restore_state, save_state
-from cell.settings.config import CellConfig
+from cell.simulation.phase import Outcome, Phase, after
+from cell.simulation.simulation import Simulation
+from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments import shaft_insertion
 from experiments.assembly import run as run_module
 from experiments.assembly.assemble import run_assemble, run_job
@@ -24,13 +24,13 @@ from experiments.assembly.job import Job
 from experiments.assembly.prepare import Disturbance, running_cell
 from experiments.assembly.run import Run, go_on
 from experiments.metrics.record import OperationRecord
+from planning.assembly_plan.planner import plan
 from planning.operations import insert_shaft
 from planning.operations.carry_out import phases
 from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import goal_pose
 from planning.operations.sequence import Operation, operations
 from planning.operations.station import Station
-from planning.plans.planner import plan
 
 PRODUCT = load_product("motor_unit")
 CONFIG = CellConfig()

@@ -9,9 +9,9 @@ import pytest
 import trimesh
 from numpy.typing import NDArray
 
-from cell.soft_jig.bed import Bed
-from cell.soft_jig.parameters import BagParameters, SoilParameters
-from cell.soft_jig.samples import SurfaceSamples
+from cell.fixtures.soft_jig.parameters import BagParameters, SoilParameters
+from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 
 UPRIGHT = np.eye(3)
 PUNCH_RADIUS = 0.0175

@@ -11,8 +11,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell import Cell, CellConfig, Simulation, add_cell, build_cell, load_product
-from cell.running.events import soften_jig
-from cell.soft_jig import JigState
+from cell.fixtures.soft_jig import JigState
+from cell.simulation.events import soften_jig
 from cell.workpieces.thread import ThreadState
 
 

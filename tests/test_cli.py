@@ -191,7 +191,7 @@ def test_errors_that_are_not_ours_are_not_hidden(
     calls: list[dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """A bug shows its traceback; only a `CellError` becomes exit 2."""
-    monkeypatch.setattr("cell.settings.config.CellConfig.load", lambda *_: 1 / 0)
+    monkeypatch.setattr("cell.configuration.config.CellConfig.load", lambda *_: 1 / 0)
     with pytest.raises(ZeroDivisionError):
         main(["plan", "x", "--out", str(tmp_path)])
     assert issubclass(BadOrder, CellError)

@@ -9,11 +9,11 @@ import yaml
 from hypothesis import given
 from hypothesis import strategies as st
 
+from cell.configuration.config import CellConfig
+from cell.configuration.config_file import CONFIG_FOLDER, changed, parse_overrides
+from cell.configuration.config_yaml import HEADER, commented_yaml
 from cell.errors import CellError, UnknownName
-from cell.settings.config import CellConfig
-from cell.settings.config_file import CONFIG_FOLDER, changed, parse_overrides
-from cell.settings.config_yaml import HEADER, commented_yaml
-from cell.settings.setting import BadSetting
+from cell.setting import BadSetting
 
 
 def test_default_file_is_what_the_code_says() -> None:

@@ -11,14 +11,14 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from cell.soft_jig.bed import Bed
-from cell.soft_jig.columns import TetMesh
-from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
-from cell.soft_jig.parameters import JigParameters
-from cell.soft_jig.plane_cells import conforming_cells, outline
-from cell.soft_jig.polygons import area, clip, lower_facets, subtract
-from cell.soft_jig.rings import FOOT_GAP
-from cell.soft_jig.samples import SurfaceSamples
+from cell.fixtures.soft_jig.mesh.columns import TetMesh
+from cell.fixtures.soft_jig.mesh.contact_mesh import bed_mesh, imprint_mesh
+from cell.fixtures.soft_jig.mesh.plane_cells import conforming_cells, outline
+from cell.fixtures.soft_jig.mesh.polygons import area, clip, lower_facets, subtract
+from cell.fixtures.soft_jig.mesh.rings import FOOT_GAP
+from cell.fixtures.soft_jig.parameters import JigParameters
+from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 
 PARAMS = JigParameters()
 # How far the rim of a wall reaches into the part.

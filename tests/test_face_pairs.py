@@ -9,10 +9,10 @@ import pytest
 from manifold3d import CrossSection
 from test_matrices import random_solids
 
-from planning.fixing.clipping import Polygons, triangle_overlaps
-from planning.fixing.contact import near_gap, surface_gap
-from planning.fixing.envelope import cross
-from planning.fixing.face_pairs import DENSE, box_pairs
+from planning.feasibility.clipping import Polygons, triangle_overlaps
+from planning.feasibility.contact import near_gap, surface_gap
+from planning.feasibility.envelope import cross
+from planning.feasibility.face_pairs import DENSE, box_pairs
 
 REACH = 3e-3  # [m] Of the same size as the gaps between the random shapes.
 

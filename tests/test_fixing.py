@@ -20,8 +20,8 @@ from cell.errors import BadOrder, CellError, UnknownName
 from cell.products.loading import load_product
 from cell.products.product import Product
 from planning import FixingPlan, plan
-from planning.fixing.algorithm import choose_posture
-from planning.fixing.directions import open_directions
+from planning.feasibility.algorithm import choose_posture
+from planning.feasibility.directions import open_directions
 
 PAPER_TABLE = {  # [S] Fixing configurations (posture, fixed part) of iterations 1 and 2.
     ("motor", "plate", "bolts"): [("+z", "motor"), ("+z", "motor")],

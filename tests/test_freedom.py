@@ -10,9 +10,9 @@ from test_matrices import solid
 from tiny_products import box, interlocked_links, peg_in_hole, product_of, rod
 
 from planning import plan
-from planning.fixing.evidence import evidence_from_dict, evidence_text, evidence_to_dict
-from planning.fixing.freedom import Freedom, contact_normals, freedoms, motion
-from planning.fixing.solids import solids_of
+from planning.feasibility.evidence import evidence_from_dict, evidence_text, evidence_to_dict
+from planning.feasibility.freedom import Freedom, contact_normals, freedoms, motion
+from planning.feasibility.solids import solids_of
 
 TOLERANCE = 5e-5
 

@@ -10,19 +10,24 @@ import pytest
 from tiny_products import bolted, box, peg_in_hole, product_of, rod, tube_and_pins
 
 from cell import CellConfig
+from cell.fixtures.soft_jig import JigParameters
 from cell.products.loading import load_product
 from cell.products.product import Product
-from cell.soft_jig import JigParameters
 from planning import plan
-from planning.fixing.algorithm import Geometry
-from planning.fixing.directions import DIRECTIONS, unit_vector
-from planning.holding.candidate import Candidate, Choice, Setup
-from planning.holding.capacity import Load, passive_pressure, sideways_capacity, turning_capacity
-from planning.holding.footprint import footprint, posture
-from planning.holding.gravity import Gravity
-from planning.holding.gripper import BELOW, STROKE, Gripper
-from planning.holding.imprint import Imprint, press, samples_of
-from planning.plans.rule import general_rule
+from planning.assembly_plan.rule import general_rule
+from planning.feasibility.algorithm import Geometry
+from planning.feasibility.directions import DIRECTIONS, unit_vector
+from planning.fixture_analysis.candidate import Candidate, Choice, Setup
+from planning.fixture_analysis.capacity import (
+    Load,
+    passive_pressure,
+    sideways_capacity,
+    turning_capacity,
+)
+from planning.fixture_analysis.footprint import footprint, posture
+from planning.fixture_analysis.gravity import Gravity
+from planning.fixture_analysis.gripper import BELOW, STROKE, Gripper
+from planning.fixture_analysis.imprint import Imprint, press, samples_of
 
 JIG = JigParameters()
 SETUP = Setup.of(CellConfig.load())

@@ -7,8 +7,8 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell import Cell, Simulation
-from cell.running.phase import Impedance, Phase, after
-from cell.running.simulation import impedance_torque
+from cell.simulation.phase import Impedance, Phase, after
+from cell.simulation.simulation import impedance_torque
 
 STIFFNESS = np.array([5.0, 5.0, 40.0, 4000.0, 4000.0, 2000.0])
 LIMIT = np.array([1.0, 1.0, 1.0, 15.0, 15.0, 10.0])

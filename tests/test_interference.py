@@ -17,11 +17,11 @@ from tiny_products import (
     tube_and_pins,
 )
 
-from planning.fixing.blocking import FRAGILE, decisions
-from planning.fixing.directions import DIRECTIONS, opposite, unit_vector
-from planning.fixing.envelope import envelope
-from planning.fixing.interference import FIT_TOLERANCE, first_hit, interference
-from planning.fixing.solids import Solid, solids_of
+from planning.feasibility.blocking import FRAGILE, decisions
+from planning.feasibility.directions import DIRECTIONS, opposite, unit_vector
+from planning.feasibility.envelope import envelope
+from planning.feasibility.interference import FIT_TOLERANCE, first_hit, interference
+from planning.feasibility.solids import Solid, solids_of
 
 PRODUCTS = [peg_in_hole, interlocked_links, stack_of_three, tube_and_pins]
 

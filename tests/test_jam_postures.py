@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial import KDTree
 
 from cell import load_product
-from cell.soft_jig import JigState, SurfaceSamples
+from cell.fixtures.soft_jig import JigState, SurfaceSamples
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import ProductPart
 

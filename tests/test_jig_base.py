@@ -7,8 +7,8 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cell import Cell, CellConfig, build_cell, load_product
-from cell.running.simulation import Simulation
-from cell.trial.stroke import Stroke
+from cell.simulation.simulation import Simulation
+from planning.operations.stroke import Stroke
 
 
 def empty_cell(fixed: bool) -> Cell:

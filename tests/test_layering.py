@@ -8,25 +8,31 @@ import pytest
 ROOT = Path(__file__).resolve().parent.parent
 ALLOWED = {"cell": set(), "planning": {"cell"}, "experiments": {"cell", "planning"}}
 SOURCES = sorted(f for p in [*ALLOWED, "tests"] for f in (ROOT / p).rglob("*.py"))
-# The rooms of a package, from the lowest up, each with those that it may use.
-ROOMS = {
+# The folders and single files of a package, from the lowest up, each with what it may use of the
+# same package. `errors`, `paths` and `setting` are for all of cell.
+LAYERS: dict[str, dict[str, set[str]]] = {
     "cell": {
-        "soft_jig": set(),
-        "settings": {"soft_jig"},
+        "errors": set(),
+        "paths": set(),
+        "setting": set(),
         "products": set(),
-        "cad": {"products"},
         "workpieces": {"products"},
-        "machines": {"settings", "workpieces"},
-        "running": {"soft_jig", "settings", "products", "workpieces", "machines"},
-        "trial": {"soft_jig", "settings", "products", "workpieces", "machines", "running"},
+        "fixtures": set(),
+        "configuration": {"fixtures"},
+        "machines": {"configuration", "workpieces"},
+        "cad": {"products"},
+        "builder": {"configuration", "fixtures", "machines", "products", "workpieces"},
+        "simulation": {
+            "builder", "configuration", "fixtures", "machines", "products", "workpieces",
+        },
     },
     "planning": {
-        "fixing": set(),
-        "holding": {"fixing"},
-        "ordering": {"fixing", "holding"},
-        "plans": {"fixing", "holding", "ordering"},
+        "feasibility": set(),
+        "fixture_analysis": {"feasibility"},
+        "ordering": {"feasibility", "fixture_analysis"},
+        "assembly_plan": {"feasibility", "fixture_analysis", "ordering"},
         "motion": set(),
-        "operations": {"fixing", "motion", "plans"},
+        "operations": {"feasibility", "motion", "assembly_plan"},
     },
     "experiments": {
         "reporting": set(),
@@ -37,11 +43,9 @@ ROOMS = {
         "paper": {"reporting", "metrics"},
         "cli": {"reporting", "plan", "assembly", "paper"},
     },
-}
-# Files beside the rooms of cell that any room may use, and that use none. Those of experiments are
-# scripts: they may use any room, and nothing uses them.
-LEAVES = {"cell": {"errors", "paths"}, "planning": set(), "experiments": set()}
-EVERY_ROOM = [(package, room) for package, rooms in ROOMS.items() for room in rooms]
+}  # fmt: skip
+EVERYWHERE = {"cell": {"errors", "paths", "setting"}, "planning": set(), "experiments": set()}
+EVERY_LAYER = [(package, layer) for package, layers in LAYERS.items() for layer in layers]
 MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
 
 
@@ -61,6 +65,17 @@ def name_of(file: Path) -> str:
     return file.relative_to(ROOT).as_posix()
 
 
+def files_of(package: str, layer: str) -> list[Path]:
+    single = ROOT / package / f"{layer}.py"
+    return [single] if single.exists() else sorted((ROOT / package / layer).rglob("*.py"))
+
+
+def used_of(package: str, file: Path) -> set[str]:
+    """Return the folders and files of a package that a source file imports, by first name."""
+    names = [name.split(".") for name in imported_modules(file)]
+    return {name[1] for name in names if name[0] == package and len(name) > 1}
+
+
 @pytest.mark.parametrize("package", ALLOWED)
 def test_imports_point_one_way(package: str) -> None:
     """Experiments may use planning, planning may use cell, and never back."""
@@ -70,43 +85,34 @@ def test_imports_point_one_way(package: str) -> None:
         assert not beyond, f"{name_of(file)} imports {sorted(beyond)}"
 
 
-def used_of(package: str, file: Path) -> set[str]:
-    """Return the rooms and files of a package that a source file imports, by first name."""
-    names = [name.split(".") for name in imported_modules(file)]
-    return {name[1] for name in names if name[0] == package and len(name) > 1}
+@pytest.mark.parametrize("package", LAYERS)
+def test_every_layer_is_known(package: str) -> None:
+    """Scripts of experiments apart, everything in a package has its place in the table."""
+    folders = {file.relative_to(ROOT / package).parts[0] for file in (ROOT / package).rglob("*.py")}
+    files = {name.removesuffix(".py") for name in folders if name.endswith(".py")} - {"__init__"}
+    known = {name for name in folders if not name.endswith(".py")}
+    known |= set() if package == "experiments" else files
+    assert set(LAYERS[package]) == known
 
 
-@pytest.mark.parametrize("package", ROOMS)
-def test_every_room_is_known(package: str) -> None:
-    assert set(ROOMS[package]) == {file.parent.name for file in (ROOT / package).glob("*/*.py")}
+@pytest.mark.parametrize("package", LAYERS)
+def test_layers_are_listed_from_the_lowest_up(package: str) -> None:
+    """What a layer may use stands before it: there are no cycles."""
+    layers = list(LAYERS[package])
+    for number, layer in enumerate(layers):
+        assert LAYERS[package][layer] <= set(layers[:number]), layer
 
 
-@pytest.mark.parametrize("package", ROOMS)
-def test_rooms_are_listed_from_the_lowest_up(package: str) -> None:
-    """What a room may use stands before it: there are no cycles."""
-    rooms = list(ROOMS[package])
-    for number, room in enumerate(rooms):
-        assert ROOMS[package][room] <= set(rooms[:number]), room
-
-
-@pytest.mark.parametrize(("package", "room"), EVERY_ROOM)
-def test_rooms_use_only_those_below(package: str, room: str) -> None:
-    for file in (ROOT / package / room).rglob("*.py"):
-        beyond = used_of(package, file) - {room} - ROOMS[package][room] - LEAVES[package]
+@pytest.mark.parametrize(("package", "layer"), EVERY_LAYER)
+def test_layers_use_only_those_below(package: str, layer: str) -> None:
+    for file in files_of(package, layer):
+        beyond = used_of(package, file) - {layer} - LAYERS[package][layer] - EVERYWHERE[package]
         assert not beyond, f"{name_of(file)} uses {sorted(beyond)}"
 
 
-def test_files_beside_the_rooms_of_cell_use_nothing_of_it() -> None:
-    """Except for the package itself: it hands out the public names."""
-    files = {file.stem: file for file in (ROOT / "cell").glob("*.py")}
-    assert set(files) == {"__init__", *LEAVES["cell"]}
-    for name in LEAVES["cell"]:
-        assert not used_of("cell", files[name]), name
-
-
-def test_scripts_use_rooms_and_not_each_other() -> None:
+def test_scripts_use_layers_and_not_each_other() -> None:
     for file in (ROOT / "experiments").glob("*.py"):
-        beyond = used_of("experiments", file) - set(ROOMS["experiments"])
+        beyond = used_of("experiments", file) - set(LAYERS["experiments"])
         assert not beyond, f"{name_of(file)} uses {sorted(beyond)}"
 
 

@@ -8,10 +8,10 @@ import trimesh
 from scipy.spatial.transform import Rotation
 from test_contact_mesh import MOTOR, PARAMS, RIM_SQUEEZE, box, overlap, pressed
 
-from cell.soft_jig import contact_mesh
-from cell.soft_jig.bed import Bed
-from cell.soft_jig.contact_mesh import imprint_mesh
-from cell.soft_jig.leaning_bed import LeaningBed
+from cell.fixtures.soft_jig import contact_mesh
+from cell.fixtures.soft_jig.mesh.contact_mesh import imprint_mesh
+from cell.fixtures.soft_jig.mesh.leaning_bed import LeaningBed
+from cell.fixtures.soft_jig.soft.bed import Bed
 
 # The model's own pieces around the plate's hole, and its foot.
 PLATE = [

@@ -18,13 +18,13 @@ from cell.cad import shapes
 from cell.products.loading import load_product
 from cell.products.product import Product
 from planning import FixingPlan, plan
-from planning.fixing.cache import cached_matrices, key_of
-from planning.fixing.contact import contact_matrix, gap_matrix
-from planning.fixing.directions import DIRECTIONS, axis_index, opposite, unit_vector
-from planning.fixing.evidence import evidence_text
-from planning.fixing.interference import Interference, interference
-from planning.fixing.matrices import Matrices, matrices_of
-from planning.fixing.solids import Solid, solids_of
+from planning.feasibility.cache import cached_matrices, key_of
+from planning.feasibility.contact import contact_matrix, gap_matrix
+from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
+from planning.feasibility.evidence import evidence_text
+from planning.feasibility.interference import Interference, interference
+from planning.feasibility.matrices import Matrices, matrices_of
+from planning.feasibility.solids import Solid, solids_of
 
 PAPER_TABLE = {
     ("motor", "plate", "bolts"): [("+z", "motor"), ("+z", "motor")],

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from cell.builder import Cell
 from cell.products.loading import load_product
-from cell.running.builder import Cell
 from experiments.metrics.bolts import advance, clamp_target, standing, torque_shares, trip
 from experiments.metrics.common import force_plate_peaks, moved
 from experiments.metrics.criteria import LIMITS, failed_checks

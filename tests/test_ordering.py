@@ -20,7 +20,7 @@ from tiny_products import (
 
 from cell.products.loading import load_product
 from planning import plan
-from planning.fixing.directions import DIRECTIONS
+from planning.feasibility.directions import DIRECTIONS
 from planning.ordering.items import Items, items_of
 from planning.ordering.precedence import precedences
 from planning.ordering.search import any_order, best_orders

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from cell.soft_jig import JigParameters, SurfaceSamples
-from cell.soft_jig.bed import Bed
-from cell.soft_jig.contact_mesh import bed_mesh, imprint_mesh
-from cell.soft_jig.parameters import SoilParameters
-from cell.soft_jig.pins import Pins
-from cell.soft_jig.yielding import Strength
+from cell.fixtures.soft_jig import JigParameters, SurfaceSamples
+from cell.fixtures.soft_jig.frozen.pins import Pins
+from cell.fixtures.soft_jig.frozen.yielding import Strength
+from cell.fixtures.soft_jig.mesh.contact_mesh import bed_mesh, imprint_mesh
+from cell.fixtures.soft_jig.parameters import SoilParameters
+from cell.fixtures.soft_jig.soft.bed import Bed
 
 WIDTH, LENGTH = 0.002, 0.020
 MODULUS = 4e8

@@ -8,7 +8,7 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cell import CellConfig
-from cell.running.log import Log
+from cell.simulation.log import Log
 from experiments.cli.main import main
 from experiments.paper.case_results import Experiment, by_outcome, verdict
 from experiments.paper.cases import Case, CaseResult, TrialResult, judged

@@ -21,9 +21,9 @@ from cell.errors import CellError
 from experiments.plan.command import run_plan
 from experiments.plan.options import PlanOptions
 from planning import FixingPlan, load_plan, plan, save_plan
-from planning.fixing.directions import DIRECTIONS
-from planning.plans.explain import explanation, stop_text
-from planning.plans.plan_file import plan_to_dict
+from planning.assembly_plan.explain import explanation, stop_text
+from planning.assembly_plan.plan_file import plan_to_dict
+from planning.feasibility.directions import DIRECTIONS
 
 PRODUCTS = [peg_in_hole, interlocked_links, stack_of_three, tube_and_pins]
 

@@ -16,9 +16,9 @@ from test_report import Outline
 from tiny_products import interlocked_links, peg_in_hole, stack_of_three, tube_and_pins
 
 from cell import CellConfig
+from cell.fixtures.soft_jig import BagParameters
 from cell.products.loading import load_product
 from cell.products.product import Product
-from cell.soft_jig import BagParameters
 from experiments.plan import page
 from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
 from experiments.plan.command import save_matrices
@@ -27,10 +27,10 @@ from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
 from experiments.reporting.render import rendering_problem
 from planning import plan
-from planning.fixing.directions import DIRECTIONS
-from planning.fixing.remark import bolt_remarks
-from planning.holding.candidate import Setup
-from planning.plans.rule import general_rule
+from planning.assembly_plan.rule import general_rule
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.remark import bolt_remarks
+from planning.fixture_analysis.candidate import Setup
 
 BAG = BagParameters()
 SETUP = Setup.of(CellConfig())

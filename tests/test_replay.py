@@ -8,11 +8,11 @@ from pathlib import Path
 import pytest
 from pydrake.systems.framework import DiagramBuilder
 
+from cell.builder import add_cell
+from cell.configuration.config import CellConfig
 from cell.products.loading import load_product
-from cell.running.builder import add_cell
-from cell.running.phase import Phase, after
-from cell.running.simulation import Simulation
-from cell.settings.config import CellConfig
+from cell.simulation.phase import Phase, after
+from cell.simulation.simulation import Simulation
 from experiments.assembly.replay import MEMBRANE_PERIOD, Replay, membrane_path
 
 

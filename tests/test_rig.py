@@ -9,13 +9,13 @@ from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell import CellConfig, load_product
 from cell.errors import BadPart, UnknownName
-from cell.running.phase import PhaseFailed
-from cell.soft_jig import SurfaceSamples
-from cell.trial.rig import HandPose, build_push_rig
-from cell.trial.rig_simulation import RigSimulation, smooth_path, stroke_path
+from cell.fixtures.soft_jig import SurfaceSamples
+from cell.simulation.phase import PhaseFailed
 from experiments.paper.cases import Case, case_seed, judged, wilson
 from experiments.paper.postures import AXES, POSTURES, PUSHES, chosen
 from experiments.paper.push_rule import push_line
+from experiments.paper.rig.rig import HandPose, build_push_rig
+from experiments.paper.rig.rig_simulation import RigSimulation, smooth_path, stroke_path
 from experiments.paper.rig_hand import RigBench, tip_pose
 from experiments.paper.trial import Disturbance, check_fits, planned_pose, run_trial
 from experiments.paper.trial_metrics import tilt_between

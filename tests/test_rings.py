@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from test_contact_mesh import PARAMS, box, pressed
 
-from cell.soft_jig.contact_mesh import imprint_mesh
-from cell.soft_jig.polygons import edge_normals
-from cell.soft_jig.rings import _outward
+from cell.fixtures.soft_jig.mesh.contact_mesh import imprint_mesh
+from cell.fixtures.soft_jig.mesh.polygons import edge_normals
+from cell.fixtures.soft_jig.mesh.rings import _outward
 
 
 def loop_around(corners: list[tuple[float, float]], longest: float = 0.006) -> np.ndarray:

@@ -8,12 +8,11 @@ from pydrake.math import RigidTransform
 
 from cell import CellConfig, load_product
 from cell.errors import CellError
-from cell.running.phase import PhaseFailed
-from cell.trial.rig import SLIDE_DRIVE, TURN_DRIVE
-from cell.trial.stroke import Stroke
+from cell.simulation.phase import PhaseFailed
 from experiments.paper.cases import Case, check_hand, judged
 from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.push_rule import leading, push_line
+from experiments.paper.rig.rig import SLIDE_DRIVE, TURN_DRIVE
 from experiments.paper.robot_hand import RobotBench, RobotHand
 from experiments.paper.trial import Disturbance, run_trial
 from experiments.paper.trial_metrics import tilt_between
@@ -22,6 +21,7 @@ from planning.motion.timing import JointMotion
 from planning.operations.grasping import reachable_grasps
 from planning.operations.placement import YAWS, pose_on_jig
 from planning.operations.push import PushLine, can_push, push
+from planning.operations.stroke import Stroke
 
 STILL = Disturbance(RigidTransform(), np.zeros(2), seed=0)
 

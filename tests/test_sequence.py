@@ -8,8 +8,8 @@ import pytest
 
 from cell.products.loading import load_product
 from cell.products.product import Product
+from planning.assembly_plan.planner import plan
 from planning.operations.sequence import NoOperation, Operation, fixed_after, operations
-from planning.plans.planner import plan
 
 MOTOR_UNIT, IDLER = load_product("motor_unit"), load_product("idler")
 SIX = tuple(f"bolt_{k}" for k in range(1, 7))

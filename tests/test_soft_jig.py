@@ -10,9 +10,9 @@ import trimesh
 from jig_rig import Rig
 from numpy.typing import NDArray
 
-from cell.soft_jig import JigParameters, JigState, SurfaceSamples
-from cell.soft_jig.drake_values import JigError
-from cell.soft_jig.parameters import VacuumParameters
+from cell.fixtures.soft_jig import JigParameters, JigState, SurfaceSamples
+from cell.fixtures.soft_jig.drake_values import JigError
+from cell.fixtures.soft_jig.parameters import VacuumParameters
 
 # A short press that still reaches the drive's limit of 20 N.
 FAST = {"speed": 0.04, "duration": 0.8}

@@ -7,8 +7,8 @@ import pytest
 from test_jam_postures import POSTURES, PRESS_FORCE
 
 from cell import load_product
-from cell.soft_jig import JigState
-from cell.soft_jig.stable import Carried, largest_stiffness, normal_rows
+from cell.fixtures.soft_jig import JigState
+from cell.fixtures.soft_jig.soft.stable import Carried, largest_stiffness, normal_rows
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import ProductPart
 

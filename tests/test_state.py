@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cell import Cell, Simulation
-from cell.running.events import soften_jig
-from cell.running.state import read_state, restore_state, save_state, write_state
+from cell.simulation.events import soften_jig
+from cell.simulation.state import read_state, restore_state, save_state, write_state
 
 STEPS = 50
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from cell.soft_jig.parameters import SuctionParameters
-from cell.soft_jig.suction import Seal, sealed_cells
+from cell.fixtures.soft_jig.frozen.suction import Seal, sealed_cells
+from cell.fixtures.soft_jig.parameters import SuctionParameters
 
 CELL, LIP = 1.5e-3, 3e-3
 N = 41

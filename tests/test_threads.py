@@ -11,10 +11,10 @@ from tiny_products import bolted, box, product_of, rod, to_trimesh
 from cell.errors import CellError
 from cell.products.product import Part, Product
 from planning import plan
-from planning.fixing.directions import DIRECTIONS
-from planning.fixing.matrices import matrices_of
-from planning.fixing.solids import Solid
-from planning.fixing.threads import find_thread
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.matrices import matrices_of
+from planning.feasibility.solids import Solid
+from planning.feasibility.threads import find_thread
 
 TOLERANCE = 5e-5
 

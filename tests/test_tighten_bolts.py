@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
-from cell.running.phase import Sensed
+from cell.simulation.phase import Sensed
 from planning.operations.station import Station
 from planning.operations.tighten_bolts import CLUTCH_TIME, Clutch, star_order
 

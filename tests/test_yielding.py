@@ -7,10 +7,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cell.soft_jig import JigParameters
-from cell.soft_jig.columns import TetMesh
-from cell.soft_jig.parameters import SoilParameters
-from cell.soft_jig.yielding import Patch, Strength, returned
+from cell.fixtures.soft_jig import JigParameters
+from cell.fixtures.soft_jig.frozen.yielding import Patch, Strength, returned
+from cell.fixtures.soft_jig.mesh.columns import TetMesh
+from cell.fixtures.soft_jig.parameters import SoilParameters
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import Prism
 

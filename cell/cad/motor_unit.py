@@ -192,7 +192,7 @@ def motor_pieces() -> list[Piece]:
     """Return the motor's contact pieces.
 
     Rear boss and terminals have none: they sink into the beads, which meet their real surface
-    (`cell.soft_jig.pins`), and nothing else ever reaches them.
+    (`cell.fixtures.soft_jig.frozen.pins`), and nothing else ever reaches them.
     """
     metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
     return [

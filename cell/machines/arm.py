@@ -25,8 +25,8 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
+from cell.configuration.config import ArmConfig
 from cell.paths import model_url, new_parser
-from cell.settings.config import ArmConfig
 
 JOINTS = (
     "shoulder_pan_joint",

@@ -21,7 +21,7 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Joint, RigidBody, SpatialInertia, UnitInertia, WeldJoint
 from pydrake.systems.framework import Context
 
-from cell.settings.config import CellConfig
+from cell.configuration.config import CellConfig
 
 BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
 

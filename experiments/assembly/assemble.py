@@ -6,8 +6,8 @@ from pathlib import Path
 
 from rich.console import Console
 
+from cell.configuration.config import CellConfig
 from cell.products.product import Product
-from cell.settings.config import CellConfig
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import check_models, running_cell
@@ -15,9 +15,9 @@ from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.replay import Replay
 from experiments.assembly.results import write_infeasible, write_results
 from experiments.assembly.run import Run, go_on, read_final_state
+from planning.assembly_plan.explain import stop_text
+from planning.assembly_plan.planner import FixingPlan, plan
 from planning.operations.sequence import NoOperation, Operation, operations
-from planning.plans.explain import stop_text
-from planning.plans.planner import FixingPlan, plan
 
 
 def run_assemble(

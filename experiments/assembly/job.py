@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 from pathlib import Path
 
+from cell.configuration.config import CellConfig
 from cell.products.product import Product
-from cell.settings.config import CellConfig
 
 
 @dataclass(frozen=True)

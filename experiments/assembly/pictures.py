@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cell.running.simulation import Simulation
+from cell.simulation.simulation import Simulation
 from experiments.assembly.run import StepResult
 from experiments.reporting.html_page import Picture
 from experiments.reporting.render import CELL_VIEW, JIG_VIEW, rendering_problem, take_picture

@@ -7,11 +7,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
 
+from cell.builder import add_cell
+from cell.configuration.config import CellConfig
 from cell.errors import CellError
 from cell.products.product import Product
-from cell.running.builder import add_cell
-from cell.running.simulation import Simulation
-from cell.settings.config import CellConfig
+from cell.simulation.simulation import Simulation
 from experiments.assembly.replay import Replay
 from planning.operations.station import Station
 

@@ -20,10 +20,10 @@ from pydrake.geometry import (
 )
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
+from cell.builder import Cell
 from cell.errors import UnknownName
-from cell.running.builder import Cell
-from cell.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
-from cell.soft_jig.visual import membrane_shape
+from cell.fixtures.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
+from cell.fixtures.soft_jig.visual import membrane_shape
 from experiments.reporting.output import write_text
 
 FRAME_PERIOD = 0.05  # Between two pictures [s] [A].

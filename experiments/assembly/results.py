@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cell.running.state import State
+from cell.simulation.state import State
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import Disturbance
@@ -20,8 +20,8 @@ from experiments.reporting.output import write_arrays, write_json
 from experiments.reporting.plots import plot_force_plate, plot_insertion_force, plot_torque
 from experiments.reporting.provenance import finite, versions
 from experiments.reporting.report import write_report
-from planning.plans.plan_file import plan_to_dict
-from planning.plans.planner import FixingPlan
+from planning.assembly_plan.plan_file import plan_to_dict
+from planning.assembly_plan.planner import FixingPlan
 
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 

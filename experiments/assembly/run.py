@@ -13,9 +13,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.errors import CellError
-from cell.running.phase import Outcome, Phase, PhaseFailed
-from cell.running.simulation import Simulation
-from cell.running.state import State, read_state, restore_state, save_state
+from cell.simulation.phase import Outcome, Phase, PhaseFailed
+from cell.simulation.simulation import Simulation
+from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments.metrics.criteria import FailedCheck, failed_checks
 from experiments.metrics.measure import measure
 from experiments.metrics.record import OperationRecord, PhaseRecord

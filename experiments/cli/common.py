@@ -11,7 +11,7 @@ from tyro.conf import UseAppendAction, arg
 from cell.errors import CellError
 
 if TYPE_CHECKING:
-    from cell.settings.config import CellConfig
+    from cell.configuration.config import CellConfig
 
 # What a command needs is imported when it runs: Drake takes a second that --help can do without.
 
@@ -43,7 +43,7 @@ class Common:
 
     def load_config(self) -> CellConfig:
         """Return the configuration that the options describe, checked."""
-        from cell.settings.config import CellConfig
+        from cell.configuration.config import CellConfig
 
         if self.seed < 0:
             raise BadUsage(f"--seed must be >= 0, not {self.seed}.")

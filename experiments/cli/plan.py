@@ -76,7 +76,7 @@ class Plan:
     def options(self) -> PlanOptions:
         """Return how the product is read and planned."""
         from experiments.plan.options import PlanOptions
-        from planning.fixing.cache import user_cache
+        from planning.feasibility.cache import user_cache
 
         if self.tolerance_mm is not None and not 0.0 < self.tolerance_mm < 10.0:
             raise BadUsage(f"--tolerance-mm must be between 0 and 10, not {self.tolerance_mm:g}.")

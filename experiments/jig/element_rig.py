@@ -25,7 +25,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cell.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
+from cell.fixtures.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
 from experiments.jig.specimens import Prism, Specimen
 
 Array = NDArray[np.float64]

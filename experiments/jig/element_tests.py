@@ -13,11 +13,11 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from cell.soft_jig import JigParameters
-from cell.soft_jig.bed import Bed
-from cell.soft_jig.parameters import FULL_VACUUM
-from cell.soft_jig.samples import SurfaceSamples
-from cell.soft_jig.yielding import Strength
+from cell.fixtures.soft_jig import JigParameters
+from cell.fixtures.soft_jig.frozen.yielding import Strength
+from cell.fixtures.soft_jig.parameters import FULL_VACUUM
+from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 from experiments.jig.element_rig import Drag, ElementRig
 from experiments.jig.specimens import Prism
 

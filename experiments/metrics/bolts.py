@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.builder import Cell
 from cell.products.product import Fastener
-from cell.running.builder import Cell
 from cell.workpieces.thread import Misfit
 from experiments.metrics.common import Measured, base_moved
 from experiments.metrics.record import Arrays, OperationRecord, PhaseRecord, logged_poses, rows_of

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.builder import Cell
 from cell.products.product import Fit, Product
-from cell.running.builder import Cell
 from experiments.metrics.bolts import standing
 from experiments.metrics.common import Measured, base_moved
 from experiments.metrics.record import Arrays, OperationRecord, logged_poses, rows_of

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from cell.builder import Cell
 from cell.products.product import Product
-from cell.running.builder import Cell
 from experiments.metrics.common import Measured, angle_between, base_moved
 from experiments.metrics.record import Arrays, OperationRecord
 from experiments.metrics.snapshot import Snapshot

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from cell.running.builder import Cell
+from cell.builder import Cell
 from experiments.metrics.bolts import measure_bolts, measure_tighten
 from experiments.metrics.common import Measured, force_plate_peaks
 from experiments.metrics.insert import measure_insert

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.running.builder import Cell
+from cell.builder import Cell
 from experiments.metrics.common import Measured, angle_between
 from experiments.metrics.record import (
     Arrays,

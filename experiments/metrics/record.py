@@ -9,7 +9,7 @@ import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
-from cell.running.builder import Cell
+from cell.builder import Cell
 from experiments.metrics.snapshot import Snapshot
 from planning.operations.sequence import Operation
 

@@ -9,8 +9,8 @@ import numpy as np
 from pydrake.geometry import QueryObject
 from pydrake.math import RigidTransform
 
-from cell.running.builder import Cell
-from cell.running.simulation import Simulation
+from cell.builder import Cell
+from cell.simulation.simulation import Simulation
 
 # Names of the collision pieces, in the models, that the hand has to keep clear of.
 SHAFTS = ("shaft", "boss")

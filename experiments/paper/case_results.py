@@ -13,7 +13,7 @@ from rich.table import Table
 from scipy.stats import t as student
 from scipy.stats import ttest_ind
 
-from cell.settings.config import CellConfig
+from cell.configuration.config import CellConfig
 from experiments.paper.case_plots import PAPER_MEANS, plot_forces, plot_quantity, plot_rates
 from experiments.paper.cases import CaseResult
 from experiments.reporting.output import write_json

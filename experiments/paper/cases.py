@@ -9,11 +9,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from scipy.stats import binomtest
 
+from cell.configuration.config import CellConfig
 from cell.errors import CellError
 from cell.products.product import Product
-from cell.settings.config import CellConfig
-from cell.trial.stage import Observer
 from experiments.paper.postures import Posture, Push
+from experiments.paper.rig.stage import Observer
 from experiments.paper.rig_hand import RigBench
 from experiments.paper.robot_hand import RobotBench
 from experiments.paper.trial import Bench, Disturbance, Trial, check_fits, ignore, run_trial

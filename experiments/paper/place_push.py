@@ -8,13 +8,13 @@ from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.progress import Progress
 
+from cell.configuration.config import CellConfig
 from cell.errors import CellError
 from cell.products.loading import load_product
-from cell.settings.config import CellConfig
-from cell.trial.stage import Observer
 from experiments.paper.case_results import Experiment, case_table, verdict, write_case_results
 from experiments.paper.cases import Case, CaseResult, run_cases
 from experiments.paper.postures import POSTURES, PUSHES, chosen
+from experiments.paper.rig.stage import Observer
 from experiments.reporting.render import View, rendering_problem, take_picture
 from experiments.reporting.report import Picture
 

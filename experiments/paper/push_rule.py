@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-from cell.running.phase import PhaseFailed
-from cell.trial.stage import Stage
-from cell.trial.stroke import Stroke
+from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import AXES, MM, Push
 from experiments.paper.reach import Fingers
+from experiments.paper.rig.stage import Stage
 from planning.operations.push import PushLine
+from planning.operations.stroke import Stroke
 
 # Least horizontal part of a unit direction that a push can follow: the part lies 84 deg askew.
 LEVEL = 0.1

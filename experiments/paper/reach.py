@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.geometry import Box, Cylinder
 
-from cell.trial.stage import Stage
+from experiments.paper.rig.stage import Stage
 
 
 @dataclass(frozen=True)

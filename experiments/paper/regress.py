@@ -16,10 +16,10 @@ from typing import Any
 from rich.console import Console
 from rich.table import Table
 
+from cell.configuration.config import CellConfig
 from cell.errors import CellError
 from cell.paths import MODELS
 from cell.products.loading import load_product
-from cell.settings.config import CellConfig
 from experiments.paper.cases import Case, CaseResult, run_cases
 from experiments.paper.place_push import cases_of
 from experiments.reporting.output import write_json

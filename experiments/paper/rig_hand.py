@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.configuration.config import CellConfig
 from cell.products.product import Grasp, Product
-from cell.running.phase import PhaseFailed
-from cell.settings.config import CellConfig
-from cell.trial.rig import HandPose, Rig, build_push_rig
-from cell.trial.rig_simulation import RigSimulation
-from cell.trial.stage import Observer
+from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import Posture
+from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
+from experiments.paper.rig.rig_simulation import RigSimulation
+from experiments.paper.rig.stage import Observer
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
 from planning.operations.pick_place import DEEPEST, JAM_TIME, PRESS_SPEED

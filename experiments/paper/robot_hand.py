@@ -13,18 +13,18 @@ from typing import cast
 
 from pydrake.math import RigidTransform
 
+from cell.builder import Cell, build_cell
+from cell.configuration.config import CellConfig
 from cell.errors import CellError
+from cell.fixtures.soft_jig import SurfaceSamples
 from cell.products.product import Product
-from cell.running.builder import Cell, build_cell
-from cell.running.events import rest_jig, wake_jig
-from cell.running.phase import Outcome, Phase, PhaseFailed, after
-from cell.running.simulation import Simulation
-from cell.settings.config import CellConfig
-from cell.soft_jig import SurfaceSamples
-from cell.trial.stage import Observer, Stage
+from cell.simulation.events import rest_jig, wake_jig
+from cell.simulation.phase import Outcome, Phase, PhaseFailed, after
+from cell.simulation.simulation import Simulation
 from experiments.metrics.common import angle_between
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line
+from experiments.paper.rig.stage import Observer, Stage
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
 from planning.operations.pick_place import pick_place
 from planning.operations.placement import YAWS, anywhere

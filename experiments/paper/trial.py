@@ -9,13 +9,13 @@ from typing import Protocol
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
+from cell.configuration.config import CellConfig
 from cell.errors import BadPart
 from cell.products.product import Part
-from cell.running.phase import PhaseFailed
-from cell.settings.config import CellConfig
-from cell.trial.stage import Observer
+from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line
+from experiments.paper.rig.stage import Observer
 from planning.operations.pick_place import SETTLE_TIME
 from planning.operations.placement import upright
 from planning.operations.push import PushLine

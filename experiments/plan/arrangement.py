@@ -7,12 +7,12 @@ from collections.abc import Iterable, Sequence
 import numpy as np
 import trimesh
 
+from cell.fixtures.soft_jig import BagParameters
 from cell.products.product import Product
-from cell.soft_jig import BagParameters
 from experiments.plan.scene import Color, Shown
-from planning.fixing.algorithm import FixingStep
-from planning.fixing.directions import opposite, unit_vector
-from planning.holding.footprint import posture
+from planning.feasibility.algorithm import FixingStep
+from planning.feasibility.directions import opposite, unit_vector
+from planning.fixture_analysis.footprint import posture
 
 MOVED: Color = (0.93, 0.52, 0.13)
 ARROW: Color = (0.80, 0.10, 0.12)

@@ -9,22 +9,22 @@ from pathlib import Path
 import numpy as np
 from rich.console import Console
 
+from cell.configuration.config import CellConfig
 from cell.products.loading import load_product
 from cell.products.product import Product
-from cell.settings.config import CellConfig
 from experiments.plan.options import PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
-from planning.fixing.directions import DIRECTIONS
-from planning.fixing.evidence import evidence_text
-from planning.fixing.remark import bolt_remarks
-from planning.holding.candidate import Choice, Setup
+from planning.assembly_plan.choice_file import choices_text, choices_to_list
+from planning.assembly_plan.explain import explanation, step_table, step_texts, stop_text
+from planning.assembly_plan.plan_file import save_plan
+from planning.assembly_plan.planner import FixingPlan, plan
+from planning.assembly_plan.rule import general_rule
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.evidence import evidence_text
+from planning.feasibility.remark import bolt_remarks
+from planning.fixture_analysis.candidate import Choice, Setup
 from planning.ordering.explain import advice_text
-from planning.plans.choice_file import choices_text, choices_to_list
-from planning.plans.explain import explanation, step_table, step_texts, stop_text
-from planning.plans.plan_file import save_plan
-from planning.plans.planner import FixingPlan, plan
-from planning.plans.rule import general_rule
 
 MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, also into a file.
 

@@ -11,7 +11,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import ListedColormap
 from matplotlib.figure import Figure
 
-from planning.fixing.directions import DIRECTIONS
+from planning.feasibility.directions import DIRECTIONS
 
 DPI = 130
 MARGIN = 0.9  # [inch] For the names beside a matrix.

@@ -15,16 +15,16 @@ from experiments.plan.scene import Shown, figure, picture
 from experiments.reporting.html_page import figures, page, pairs, section, table
 from experiments.reporting.output import write_text
 from experiments.reporting.render import rendering_problem
-from planning.fixing.algorithm import READING
-from planning.fixing.directions import opposite
-from planning.fixing.evidence import evidence_text
-from planning.fixing.order import together
-from planning.holding.candidate import CRITERIA, Candidate, Choice, Setup
-from planning.holding.footprint import USUAL_DEPTH
+from planning.assembly_plan.explain import blocker_text, step_texts, stop_text
+from planning.assembly_plan.planner import FixingPlan
+from planning.feasibility.algorithm import READING
+from planning.feasibility.directions import opposite
+from planning.feasibility.evidence import evidence_text
+from planning.feasibility.order import together
+from planning.fixture_analysis.candidate import CRITERIA, Candidate, Choice, Setup
+from planning.fixture_analysis.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.explain import advice_text, arrow_text
-from planning.plans.explain import blocker_text, step_texts, stop_text
-from planning.plans.planner import FixingPlan
 
 MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
 MOST_BLOCKERS = 400

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator, Iterator
 
-from cell.running.phase import Outcome, Phase, after
+from cell.simulation.phase import Outcome, Phase, after
 from planning.operations.counter_hold import hold, park, release_hold
 from planning.operations.insert_shaft import insert_shaft
 from planning.operations.pick_place import pick_place

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Generator, Iterator
 
 from cell.products.product import Grasp
-from cell.running.phase import Outcome, Phase, motion_finished
+from cell.simulation.phase import Outcome, Phase, motion_finished
 from planning.operations.grasping import (
     HAND_SPEED,
     Reach,

@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cell.machines.tools import JAW_SETBACK
 from cell.products.product import Grasp
-from cell.running.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
+from cell.simulation.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
 from planning.motion.kinematics import Unreachable
 from planning.operations.station import Station
 

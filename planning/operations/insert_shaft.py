@@ -14,9 +14,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
 
+from cell.configuration.config import InsertionConfig
 from cell.products.product import Fit
-from cell.running.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
-from cell.settings.config import InsertionConfig
+from cell.simulation.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
 from planning.operations.grasping import (
     HAND_SPEED,
     Reach,

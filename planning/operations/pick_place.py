@@ -7,10 +7,10 @@ from collections.abc import Iterator
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.fixtures.soft_jig import JigState
 from cell.products.product import Grasp
-from cell.running.events import evacuate_jig, inflate_jig, soften_jig
-from cell.running.phase import Condition, Phase, Sensed, after, motion_finished
-from cell.soft_jig import JigState
+from cell.simulation.events import evacuate_jig, inflate_jig, soften_jig
+from cell.simulation.phase import Condition, Phase, Sensed, after, motion_finished
 from planning.motion.kinematics import Unreachable
 from planning.operations.grasping import (
     Reach,

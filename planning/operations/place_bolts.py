@@ -11,7 +11,7 @@ from collections.abc import Iterator
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.running.phase import Phase, after, motion_finished
+from cell.simulation.phase import Phase, after, motion_finished
 from planning.operations.grasping import (
     HAND_SPEED,
     Reach,

@@ -9,13 +9,13 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.interpolate import CubicSpline
 
-from cell.running.phase import Jaw, Phase, motion_finished
-from cell.trial.stroke import Stroke
+from cell.simulation.phase import Jaw, Phase, motion_finished
 from planning.motion.kinematics import Unreachable, tool_pose
 from planning.motion.paths import NoPath, plan_line
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import HAND_SPEED
 from planning.operations.station import Station
+from planning.operations.stroke import Stroke
 
 # The hand comes from above and behind, then straight down, then slowly forward to the start.
 ABOVE, BEHIND_ABOVE = 0.12, 0.05  # [m] [A]

@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 
 from cell.errors import CellError
 from cell.products.product import Fit, Product
-from planning.fixing.algorithm import FixingStep
-from planning.plans.planner import FixingPlan
+from planning.assembly_plan.planner import FixingPlan
+from planning.feasibility.algorithm import FixingStep
 
 
 class NoOperation(CellError):

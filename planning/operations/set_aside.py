@@ -10,8 +10,8 @@ from collections.abc import Iterator
 
 from pydrake.math import RigidTransform
 
-from cell.running.events import release_from_jig, soften_jig
-from cell.running.phase import Phase, Sensed, after, motion_finished
+from cell.simulation.events import release_from_jig, soften_jig
+from cell.simulation.phase import Phase, Sensed, after, motion_finished
 from planning.operations.grasping import (
     HAND_SPEED,
     Reach,

@@ -12,10 +12,10 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame, SpatialInertia
 from pydrake.systems.framework import Context
 
+from cell.builder import Cell, add_arms, add_workcell
+from cell.configuration.config import CellConfig
 from cell.machines.arm import Arm
 from cell.products.product import Part, Product
-from cell.running.builder import Cell, add_arms, add_workcell
-from cell.settings.config import CellConfig
 from cell.workpieces.parts import add_parts
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath

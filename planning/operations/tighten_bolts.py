@@ -13,7 +13,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 
-from cell.running.phase import Follow, Phase, Sensed, after, motion_finished
+from cell.simulation.phase import Follow, Phase, Sensed, after, motion_finished
 from cell.workpieces.thread import BIT_SEAT, Thread, ThreadState
 from planning.motion.kinematics import Unreachable
 from planning.motion.timing import JointMotion

@@ -6,8 +6,8 @@ import time
 from dataclasses import dataclass
 
 from cell.products.product import Product
-from planning.fixing.algorithm import Geometry
-from planning.fixing.solids import Solid
+from planning.feasibility.algorithm import Geometry
+from planning.feasibility.solids import Solid
 from planning.ordering.items import Items, as_set, items_of
 from planning.ordering.objective import HEIGHT_UNIT, Objective
 from planning.ordering.precedence import Precedence, precedences

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.fixing.directions import DIRECTIONS
+from planning.feasibility.directions import DIRECTIONS
 
 
 @dataclass(frozen=True)

@@ -19,13 +19,19 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.settings.config import PlacementConfig
-from cell.soft_jig import JigParameters
-from planning.fixing.algorithm import choose_posture
-from planning.fixing.directions import opposite
-from planning.fixing.solids import Solid
-from planning.holding.footprint import USUAL_DEPTH, Footprint, footprint, posture, standing_points
-from planning.holding.imprint import Surface, press, samples_of
+from cell.configuration.config import PlacementConfig
+from cell.fixtures.soft_jig import JigParameters
+from planning.feasibility.algorithm import choose_posture
+from planning.feasibility.directions import opposite
+from planning.feasibility.solids import Solid
+from planning.fixture_analysis.footprint import (
+    USUAL_DEPTH,
+    Footprint,
+    footprint,
+    posture,
+    standing_points,
+)
+from planning.fixture_analysis.imprint import Surface, press, samples_of
 from planning.ordering.items import Items, as_set, members
 from planning.ordering.search import Cost
 

@@ -1,0 +1,207 @@
+"""Steps a rig: hand along given paths, jaws, bag, stand; forces and poses are recorded."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.systems.analysis import Simulator
+from pydrake.systems.framework import Context
+
+from cell.errors import CellError
+from cell.fixtures.soft_jig import JigState, SoftJig
+from experiments.paper.rig.rig import HandPose, Rig
+from experiments.paper.rig.stage import Observer
+from planning.operations.stroke import Stroke
+
+
+@dataclass(frozen=True)
+class Path:
+    """Joint targets of the carriage over time, from rest.
+
+    Attributes:
+        at: Returns positions (5,) and rates (5,) for a time [s].
+        duration: After which the end is held, at rest [s].
+    """
+
+    at: Callable[[float], tuple[np.ndarray, np.ndarray]]
+    duration: float
+
+
+def smooth_path(q0: np.ndarray, q1: np.ndarray, speed: float) -> Path:
+    """Return the straight joint path from rest to rest whose fastest slide has a mean speed.
+
+    A turn counts as a slide at a lever of 0.1 m.
+    """
+    way = float(np.max(np.abs(q1 - q0) * np.array([1.0, 1.0, 1.0, 0.1, 0.1])))
+    duration = max(way / speed, 0.05)
+
+    def at(t: float) -> tuple[np.ndarray, np.ndarray]:
+        s = min(t / duration, 1.0)
+        return q0 + (3 - 2 * s) * s**2 * (q1 - q0), 6 * s * (1 - s) / duration * (q1 - q0)
+
+    return Path(at, duration)
+
+
+def stroke_path(q0: np.ndarray, q1: np.ndarray, speed: float, acceleration: float) -> Path:
+    """Return the straight path of a push: speeding up evenly, with a dead stop at its end."""
+    way = float(np.linalg.norm((q1 - q0)[:3]))
+    direction = (q1 - q0) / way
+    stroke = Stroke(way, speed, acceleration)
+
+    def at(t: float) -> tuple[np.ndarray, np.ndarray]:
+        distance, rate = stroke.at(t)
+        return q0 + distance * direction, rate * direction
+
+    return Path(at, stroke.duration)
+
+
+class RigSimulation:
+    """A running rig.
+
+    Args:
+        rig: A built rig.
+        X_WJ: Where the jig stands.
+        X_WP: Where the stand holds the part.
+        pose: Where the hand is.
+
+    Attributes:
+        root: Context of the diagram.
+        observer: Records it.
+        stepping_cpu: CPU seconds spent stepping so far.
+    """
+
+    def __init__(
+        self, rig: Rig, X_WJ: RigidTransform, X_WP: RigidTransform, pose: HandPose
+    ) -> None:
+        self.rig = rig
+        self.simulator = Simulator(rig.diagram)
+        self.root: Context = self.simulator.get_mutable_context()
+        self.observer = Observer(rig, self.root)
+        self.stepping_cpu = 0.0
+        self.steps = 0
+        self.pose = pose
+        self._bed_pushes = False
+        rig.reset(self.root, X_WJ, X_WP, rig.joints(pose))
+        self.simulator.Initialize()
+
+    @property
+    def time_step(self) -> float:
+        """Time step of the plant [s]."""
+        return self.rig.config.simulation.time_step
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        return self.steps * self.time_step
+
+    # Commands.
+
+    def begin(self, name: str) -> None:
+        """Start a phase; failures and the log carry its name."""
+        self.observer.begin(name, self.time)
+
+    def jaws(self, opening: float, force: float = 0.0) -> None:
+        """Drive the tip pads to an opening [m], pressing with a force per pad [N] there."""
+        self.rig.gripper.command(self.root, opening, force)
+
+    def press_with_part(self) -> None:
+        """Let the bag go soft and carry the part by its real surface."""
+        jig = self.rig.soft_jig
+        if jig is not None:
+            jig.soften(self.root)
+            jig.press_with(self.rig.part.body, self.rig.samples)
+
+    def evacuate(self) -> None:
+        """Start the pump, unless the configured vacuum is none at all: then the bag stays soft."""
+        jig = self.rig.soft_jig
+        if jig is not None and jig.params.vacuum.pressure > 0:
+            jig.evacuate(self.root)
+
+    @property
+    def frozen(self) -> bool:
+        """Whether there is nothing left to freeze."""
+        jig = self.rig.soft_jig
+        if jig is None or jig.params.vacuum.pressure == 0:
+            return True
+        return jig.state is JigState.JAMMED
+
+    def sleep(self) -> None:
+        """Let part and jig rest as they are: nothing touches them, so nothing is computed."""
+        self.rig.part.sleep(self.root)
+        self.rig.jig_base.sleep(self.root)
+
+    def wake(self) -> None:
+        """Let part and jig move again."""
+        self.rig.jig_base.wake(self.root)
+        self.rig.part.wake(self.root)
+
+    def wait(self, seconds: float) -> None:
+        """Hold everything."""
+        for _ in range(round(seconds / self.time_step)):
+            self.step()
+
+    def move(self, goal: HandPose, speed: float) -> None:
+        """Take the hand to a pose; the mean speed is that of the fastest slide [m/s]."""
+        start, self.pose = self.rig.joints(self.pose), goal
+        self.follow(smooth_path(start, self.rig.joints(goal), speed))
+
+    def push(self, goal: HandPose, speed: float, acceleration: float) -> None:
+        """Take the hand straight to a position, with a dead stop at the end."""
+        start, self.pose = self.rig.joints(self.pose), goal
+        self.follow(stroke_path(start, self.rig.joints(goal), speed, acceleration))
+
+    def lower(self, speed: float, farthest: float, force: float) -> bool:
+        """Lower the hand until it is pushed up with a force [N]; return whether that happened."""
+        start, hanging = self.pose, self.observer.latest[5]  # The part's weight is in the reading.
+        for k in range(1, round(farthest / speed / self.time_step) + 1):
+            depth = speed * k * self.time_step
+            self.pose = HandPose(start.p_WT - [0, 0, depth], start.turn, start.tilt)
+            q = self.rig.joints(self.pose)
+            self.rig.drive.set_target(self.root, q, np.array([0, 0, -speed, 0, 0]))
+            self.step()
+            if self.observer.latest[5] - hanging >= force:
+                self.rig.drive.set_target(self.root, q, np.zeros(5))
+                return True
+        return False
+
+    def follow(self, path: Path) -> None:
+        """Drive the carriage along a path."""
+        for k in range(1, round(path.duration / self.time_step) + 2):
+            # The implicit drive reaches the target at the end of the step.
+            self.rig.drive.set_target(self.root, *path.at(k * self.time_step))
+            self.step()
+
+    # Stepping.
+
+    def step(self) -> None:
+        """Advance plant and bag by one step and record it.
+
+        Raises:
+            PhaseFailed: The part dropped off, the solver failed or the state is not finite.
+        """
+        start = time.process_time()
+        self.steps += 1
+        try:
+            self.simulator.AdvanceTo(self.time)
+        except RuntimeError as error:
+            raise self.observer.failure(f"solver failure: {str(error).splitlines()[0]}") from error
+        if self.rig.soft_jig is not None:
+            self._step_bag(self.rig.soft_jig)
+        self.observer.step(self.steps, self.time)
+        self.stepping_cpu += time.process_time() - start
+
+    def _step_bag(self, jig: SoftJig) -> None:
+        try:
+            jig.step(self.root, self.time_step)
+        except CellError as error:
+            # An imprint that the bag cannot hold is a verdict on the trial, not bad input.
+            raise self.observer.failure(str(error)) from error
+        forces = jig.applied_forces
+        if forces or self._bed_pushes:
+            port = self.rig.plant.get_applied_spatial_force_input_port()
+            port.FixValue(self.observer.context, forces)
+            self._bed_pushes = bool(forces)

@@ -1,0 +1,92 @@
+"""A fixing plan as text for a terminal: the steps, the matrices, and why things are blocked."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+
+import numpy as np
+from rich.markup import escape
+from rich.table import Table
+
+from planning.assembly_plan.planner import FixingPlan
+from planning.feasibility.algorithm import READING, FixingStep
+from planning.feasibility.directions import DIRECTIONS, open_directions
+from planning.feasibility.interference import Blocker
+from planning.feasibility.order import together
+from planning.ordering.explain import precedence_text
+
+
+def step_table(plan: FixingPlan) -> Table:
+    """Return one row per step: what comes in, A by direction, posture and fixed part, and CoG."""
+    table = Table(title=f"{plan.product}: {', '.join(plan.order)}", title_justify="left")
+    for heading in ("step", "incoming", *DIRECTIONS, "posture / fixed", "up"):
+        table.add_column(heading)
+    table.add_column(escape("CoG height [mm]"), justify="right")
+    for number, step in enumerate(plan.steps, start=1):
+        table.add_row(str(number), *_step_cells(step))
+    return table
+
+
+def _step_cells(step: FixingStep) -> list[str]:
+    digits = [str(step.directions[j]) for j in DIRECTIONS]
+    chosen = f"{step.posture} / {step.fixed_part}"
+    return [step.item, *digits, chosen, step.up, f"{1e3 * step.cog_height:.1f}"]
+
+
+def stop_text(plan: FixingPlan) -> str:
+    """Return why Algorithm 1 stopped, with the evidence for each direction; "" if it did not."""
+    if plan.stop is None:
+        return ""
+    stop, target = plan.stop, together(plan.order[: len(plan.steps) + 1])
+    lines = [f"Infeasible: {stop.item} cannot be added to {target}: {stop.reason}."]
+    return "\n".join(lines + [f"  {blocker_text(blocker)}" for blocker in stop.blockers])
+
+
+def blocker_text(blocker: Blocker) -> str:
+    """Return one blocked motion as a sentence; the point is in the product frame."""
+    x, y, z = (1e3 * value + 0.0 for value in blocker.p_AoQ)
+    return (
+        f"{blocker.direction}: {blocker.moving} hits {blocker.staying} at "
+        f"({x:.2f}, {y:.2f}, {z:.2f}) mm after {1e3 * blocker.travel:.2f} mm"
+    )
+
+
+def explanation(plan: FixingPlan) -> str:
+    """Return everything the plan rests on: matrices, A lists, reasons, and all blocked pairs."""
+    sections = [
+        "Contact C:\n" + matrix_text(plan.parts, plan.contact),
+        "Interference-free M_j: 1 = the row's part leaves the column's part along j",
+        *(f"M_{j}:\n" + matrix_text(plan.parts, plan.free[j]) for j in DIRECTIONS),
+        "Reachable W_j = (C + C^T) * M_j",
+        *(f"W_{j}:\n" + matrix_text(plan.parts, plan.reachable[j]) for j in DIRECTIONS),
+        *([precedence_text(plan.orders)] if plan.orders and plan.orders.ranked else []),
+        "Steps:\n" + "\n".join(step_texts(plan)),
+        "Reading: " + READING,
+        "Blocked, with a point of the part that stays, in the product frame:\n"
+        + "\n".join("  " + blocker_text(blocker) for blocker in _sorted(plan)),
+    ]
+    return "\n\n".join(sections)
+
+
+def step_texts(plan: FixingPlan) -> list[str]:
+    """Return each step's A list and reason."""
+    return [
+        f"  A({together(plan.order[: number + 1])}; {step.item}): "
+        f"{', '.join(open_directions(step.directions))}. {step.reason}"
+        for number, step in enumerate(plan.steps)
+    ]
+
+
+def matrix_text(names: Iterable[str], matrix: np.ndarray) -> str:
+    """Return a 0/1 matrix with its row names; the columns are in the same order."""
+    names = list(names)
+    width = max(map(len, names))
+    rows = zip(names, matrix, strict=True)
+    return "\n".join(f"  {name:{width}}  {' '.join(map(str, row))}" for name, row in rows)
+
+
+def _sorted(plan: FixingPlan) -> list[Blocker]:
+    part, direction = plan.parts.index, DIRECTIONS.index
+    return sorted(
+        plan.blockers, key=lambda b: (part(b.moving), part(b.staying), direction(b.direction))
+    )

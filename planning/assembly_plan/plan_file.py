@@ -1,0 +1,134 @@
+"""``plan.json``: a fixing plan on file, for other programs and for a later stage."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Mapping
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cell.errors import CellError
+from planning.assembly_plan.planner import FixingPlan
+from planning.feasibility.algorithm import READING, FixingStep, Stop
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.evidence import evidence_from_dict, evidence_to_dict
+from planning.feasibility.interference import Blocker
+from planning.ordering.advice_file import advice_from_dict, advice_to_dict
+
+
+def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
+    """Return the plan as plain lists, numbers and strings; lengths in metres."""
+    return {
+        "product": plan.product,
+        "order": list(plan.order),
+        "feasible": plan.feasible,
+        "reading": READING,
+        "parts": list(plan.parts),
+        "contact": plan.contact.tolist(),
+        "free": {j: plan.free[j].tolist() for j in DIRECTIONS},
+        "reachable": {j: plan.reachable[j].tolist() for j in DIRECTIONS},
+        "steps": [_step_to_dict(step) for step in plan.steps],
+        "stopped": _stop_to_dict(plan.stop) if plan.stop else None,
+        "blockers": [_blocker_to_dict(blocker) for blocker in plan.blockers],
+        "orders": advice_to_dict(plan.orders) if plan.orders else None,
+        "seconds": plan.seconds,
+        "evidence": evidence_to_dict(plan.evidence) if plan.evidence else None,
+    }
+
+
+def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
+    """Return the plan that ``plan_to_dict`` described."""
+    return FixingPlan(
+        product=data["product"],
+        order=tuple(data["order"]),
+        parts=tuple(data["parts"]),
+        contact=np.array(data["contact"], int),
+        free={j: np.array(data["free"][j], int) for j in DIRECTIONS},
+        reachable={j: np.array(data["reachable"][j], int) for j in DIRECTIONS},
+        blockers=tuple(_blocker_from_dict(blocker) for blocker in data["blockers"]),
+        steps=tuple(_step_from_dict(step) for step in data["steps"]),
+        stop=_stop_from_dict(data["stopped"]) if data["stopped"] else None,
+        seconds=data["seconds"],
+        orders=advice_from_dict(data["orders"]) if data["orders"] else None,
+        evidence=evidence_from_dict(data["evidence"]) if data["evidence"] else None,
+    )
+
+
+def save_plan(plan: FixingPlan, file: Path, **sections: Any) -> None:
+    """Write a plan; the file appears only when it is complete.
+
+    Args:
+        plan: The plan.
+        file: ``plan.json``.
+        sections: More of it, plain values by name, which ``load_plan`` leaves alone.
+    """
+    partial = file.with_name(file.name + ".part")
+    # One line per key: a matrix row on a line each would run to 100 000 lines for 100 parts.
+    data = plan_to_dict(plan) | sections
+    lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items()]
+    partial.write_text("{\n" + ",\n".join(lines) + "\n}\n")
+    os.replace(partial, file)
+
+
+def load_plan(file: Path) -> FixingPlan:
+    """Read a plan that ``save_plan`` wrote."""
+    try:
+        return plan_from_dict(json.loads(file.read_text()))
+    except OSError as error:
+        raise CellError(f"Plan file '{file}' cannot be read: {error.strerror}.") from error
+    except KeyError as error:
+        raise CellError(f"'{file}' is not a complete plan file: it lacks {error}.") from error
+    except (ValueError, TypeError) as error:
+        raise CellError(f"'{file}' is not a plan file: {error}.") from error
+
+
+def _step_to_dict(step: FixingStep) -> dict[str, Any]:
+    data = asdict(step) | {"target": list(step.target), "incoming": list(step.incoming)}
+    data["cog_height_m"] = data.pop("cog_height")
+    return data
+
+
+def _step_from_dict(data: Mapping[str, Any]) -> FixingStep:
+    fields: dict[str, Any] = dict(data)
+    fields["target"], fields["incoming"] = tuple(data["target"]), tuple(data["incoming"])
+    fields["cog_height"] = fields.pop("cog_height_m")
+    return FixingStep(**fields)
+
+
+def _stop_to_dict(stop: Stop) -> dict[str, Any]:
+    return {
+        "item": stop.item,
+        "target": list(stop.target),
+        "incoming": list(stop.incoming),
+        "reason": stop.reason,
+        "blockers": [_blocker_to_dict(blocker) for blocker in stop.blockers],
+    }
+
+
+def _stop_from_dict(data: Mapping[str, Any]) -> Stop:
+    return Stop(
+        data["item"],
+        tuple(data["target"]),
+        tuple(data["incoming"]),
+        data["reason"],
+        tuple(_blocker_from_dict(blocker) for blocker in data["blockers"]),
+    )
+
+
+def _blocker_to_dict(blocker: Blocker) -> dict[str, Any]:
+    return {
+        "moving": blocker.moving,
+        "staying": blocker.staying,
+        "direction": blocker.direction,
+        "point_m": list(blocker.p_AoQ),
+        "travel_m": blocker.travel,
+    }
+
+
+def _blocker_from_dict(data: Mapping[str, Any]) -> Blocker:
+    x, y, z = data["point_m"]
+    return Blocker(data["moving"], data["staying"], data["direction"], (x, y, z), data["travel_m"])

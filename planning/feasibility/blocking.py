@@ -1,0 +1,273 @@
+"""Which parts block which others along one axis, with the margin of each decision.
+
+Three rounds, each for what the one before left open. Bounding boxes: parts that pass each other.
+Widest faces, for all pairs of parts at once: two large faces in each other's way settle most
+blocked pairs. All faces that can hit each other: only regions made of slivers need their union.
+
+A decision flips at some critical tolerance, below which the pair is blocked and above which it is
+free. It is not looked for where it does not matter: a pair blocked at 1.5 times the tolerance, or
+free at half of it, is decided with a margin of at least half the tolerance (0.025 mm of 0.05).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planning.feasibility.clipping import Polygons, point_in_wide_union
+from planning.feasibility.envelope import Envelope, Faces
+from planning.feasibility.face_pairs import (
+    DENSE,
+    FacePairs,
+    blocked_regions,
+    crossing_faces,
+    paired,
+)
+
+# Of the tolerance: a decision with less margin than this is worth a remark. [D] Seen edge on, a
+# layer of overlap as thick as the tolerance lets a disc of half the tolerance in, and no larger.
+FRAGILE = 0.5
+HALVINGS = 5  # Of the 0.025 mm in which a fragile decision flips: to 0.8 um.
+
+HEAD = 24  # Widest faces of each part that the second round looks at, up and down.
+TRIED = 6  # Widest common rectangles of two parts that the second round clips.
+SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
+FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
+BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
+GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
+PROBES = 48  # Faces of a finely tessellated part that are tried before all of them are.
+SEEDS, NEAR = 4, 4.0  # Widest slivers that are merged with those within so many tolerances.
+
+
+@dataclass(frozen=True, eq=False)
+class Decision:
+    """Whether one part hits another along the axis.
+
+    Attributes:
+        point: (2,) a point of the plane across the axis over which it is hit [m]; None if free.
+        margin: How much the tolerance can change before the decision flips [m], at least.
+    """
+
+    point: np.ndarray | None
+    margin: float
+
+
+def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, int], Decision]:
+    """Return a decision for each ordered pair (moving, staying) whose boxes are in the way.
+
+    Args:
+        views: The parts' envelopes along one axis.
+        tolerance: Height of overlap and radius of the region that do not count [m].
+
+    Pairs left out are free, by a margin of ``FRAGILE`` of the tolerance or more.
+    """
+    less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
+    pairs = _meeting_boxes(views, less)
+    hits = _wide_hits(views, pairs, more)
+    hits |= _seen_hits(dict(_probes(views, pairs, hits, more)), more)
+    found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
+    group: dict[tuple[int, int], FacePairs] = {}
+    held = 0
+    for i, k in ((int(i), int(k)) for i, k in pairs):
+        if (i, k) in found:
+            continue
+        group[i, k] = crossing_faces(views[i].down, views[k].up, less)
+        held += len(group[i, k])
+        if held > GROUP:
+            found |= _decided(group, tolerance)
+            group, held = {}, 0
+    return found | _decided(group, tolerance)
+
+
+def _probes(
+    views: Sequence[Envelope],
+    pairs: np.ndarray,
+    known: Mapping[tuple[int, int], np.ndarray],
+    tolerance: float,
+) -> Iterator[tuple[tuple[int, int], FacePairs]]:
+    """Yield a few of the face pairs of finely tessellated parts that are not settled yet."""
+    for i, k in ((int(i), int(k)) for i, k in pairs):
+        down, up = views[i].down, views[k].up
+        if (i, k) not in known and len(down.low) * len(up.low) > DENSE:
+            few = down.chosen(np.linspace(0, len(down.low) - 1, PROBES).astype(int))
+            found = crossing_faces(few, up, tolerance)
+            if len(found):
+                yield (i, k), found
+
+
+def _meeting_boxes(views: Sequence[Envelope], tolerance: float) -> np.ndarray:
+    """Return (p, 2) ordered pairs of parts whose boxes do not pass each other along the axis."""
+    low, high = np.array([v.low for v in views]), np.array([v.high for v in views])
+    meet = high[None, :, 2] > low[:, None, 2] + tolerance
+    for axis in (0, 1):
+        overlap = np.minimum(high[:, None, axis], high[None, :, axis])
+        overlap -= np.maximum(low[:, None, axis], low[None, :, axis])
+        meet &= overlap > 2.0 * tolerance
+    np.fill_diagonal(meet, False)
+    return np.argwhere(meet)
+
+
+def _wide_hits(
+    views: Sequence[Envelope], pairs: np.ndarray, tolerance: float
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return a blocked point (2,) for each pair of parts that two of their widest faces settle."""
+    down, up = _heads([v.down for v in views]), _heads([v.up for v in views])
+    rows = max(1, SHARE // HEAD**2)
+    hits: dict[tuple[int, int], np.ndarray] = {}
+    for first in range(0, len(pairs), rows):
+        chosen = pairs[first : first + rows]
+        owner, d, u = _widest_rectangles(down, up, chosen, tolerance)
+        regions = blocked_regions([paired(down, up, d, u)], tolerance)
+        centres, radii = regions.discs()
+        wide = np.flatnonzero(radii >= tolerance)
+        for (i, k), centre in zip(chosen[owner[wide]], centres[wide], strict=True):
+            hits.setdefault((int(i), int(k)), centre)
+    return hits
+
+
+def _heads(faces: Sequence[Faces]) -> Faces:
+    """Return the widest faces of all parts in one, ``HEAD`` a part; padding has an empty box."""
+    count = len(faces) * HEAD
+    corners, planes = np.zeros((count, 3, 2)), np.zeros((count, 3))
+    low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    for part, own in enumerate(faces):
+        size = min(HEAD, len(own.low))
+        place = slice(part * HEAD, part * HEAD + size)
+        corners[place], planes[place] = own.corners[:size], own.planes[:size]
+        low[place], high[place] = own.low[:size], own.high[:size]
+    return Faces(0, corners, planes, low, high)
+
+
+def _widest_rectangles(
+    down: Faces, up: Faces, pairs: np.ndarray, tolerance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return (index into pairs, down-face, up-face) of the widest common rectangles."""
+    d = pairs[:, :1] * HEAD + np.arange(HEAD)
+    u = pairs[:, 1:] * HEAD + np.arange(HEAD)
+    sizes = [
+        np.minimum(down.high[d, axis][:, :, None], up.high[u, axis][:, None])
+        - np.maximum(down.low[d, axis][:, :, None], up.low[u, axis][:, None])
+        for axis in (0, 1)
+    ]
+    above = up.high[u, 2][:, None] > down.low[d, 2][:, :, None] + tolerance
+    width = np.where(above, np.minimum(sizes[0], sizes[1]), 0.0)
+    width = width.reshape(len(pairs), -1)
+    widest = np.argpartition(-width, TRIED, axis=1)[:, :TRIED]
+    owner, column = np.nonzero(np.take_along_axis(width, widest, axis=1) > 2.0 * tolerance)
+    place = widest[owner, column]
+    return owner, d[owner, place // HEAD], u[owner, place % HEAD]
+
+
+def _decided(
+    group: dict[tuple[int, int], FacePairs], tolerance: float
+) -> dict[tuple[int, int], Decision]:
+    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance."""
+    group = {parts: pairs for parts, pairs in group.items() if len(pairs)}
+    hits = _seen_hits(group, (1.0 + FRAGILE) * tolerance)
+    found = {parts: Decision(point, FRAGILE * tolerance) for parts, point in hits.items()}
+    for parts, pairs in group.items():
+        if parts not in found:
+            found[parts] = _decide(pairs, tolerance)
+    return found
+
+
+def _seen_hits(
+    group: Mapping[tuple[int, int], FacePairs], tolerance: float
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return a blocked point (2,) where one region, or one with its neighbours, is wide enough."""
+    hits: dict[tuple[int, int], np.ndarray] = {}
+    seeds: dict[tuple[int, int], np.ndarray] = {}
+    first = {parts: pairs.chosen(slice(FIRST)) for parts, pairs in group.items()}
+    for parts, regions in _clipped(first, tolerance).items():
+        widest = np.argsort(-regions.radii)[:SEEDS]
+        centres = regions.centres[widest[regions.radii[widest] > 0.0]]
+        if len(centres) and regions.radii[widest[0]] >= tolerance:
+            hits[parts] = centres[0]
+        else:
+            seeds[parts] = centres
+    for number in range(SEEDS):
+        around = {
+            parts: group[parts].near(centres[number], NEAR * tolerance)
+            for parts, centres in seeds.items()
+            if parts not in hits and number < len(centres)
+        }
+        for parts, regions in _clipped(around, tolerance).items():
+            point = _wide_point([regions], tolerance)
+            if point is not None:
+                hits[parts] = point
+    return hits
+
+
+@dataclass(frozen=True, eq=False)
+class _Regions:
+    """Blocked regions of one pair of parts with their areas, and a disc in each of them."""
+
+    polygons: Polygons
+    areas: np.ndarray
+    centres: np.ndarray
+    radii: np.ndarray
+
+
+def _clipped(
+    group: Mapping[tuple[int, int], FacePairs], tolerance: float
+) -> dict[tuple[int, int], _Regions]:
+    """Return the blocked regions of several pairs of parts, clipped and measured at once."""
+    if not group:
+        return {}
+    polygons = blocked_regions(list(group.values()), tolerance)
+    areas, (centres, radii) = polygons.areas(), polygons.discs()
+    ends = np.cumsum([len(pairs) for pairs in group.values()])
+    return {
+        parts: _Regions(polygons.chosen(own), areas[own], centres[own], radii[own])
+        for parts, own in (
+            (parts, slice(end - len(pairs), end))
+            for (parts, pairs), end in zip(group.items(), ends, strict=True)
+        )
+    }
+
+
+def _decide(pairs: FacePairs, tolerance: float) -> Decision:
+    """Decide one pair of parts by the union of its regions."""
+    less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
+    if _blocked_point(pairs, less) is None:
+        return Decision(None, FRAGILE * tolerance)
+    point = _blocked_point(pairs, more)
+    return _bisected(pairs, tolerance) if point is None else Decision(point, FRAGILE * tolerance)
+
+
+def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
+    """Decide a pair of parts that is blocked at the lower tolerance and free at the higher."""
+    point = _blocked_point(pairs, tolerance)
+    step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
+    same, flipped = 0.0, 1.0  # In steps: the decision is the same here, and flipped there.
+    for _ in range(HALVINGS):
+        middle = (same + flipped) / 2
+        there = _blocked_point(pairs, tolerance + middle * step)
+        if (there is None) == (point is None):
+            same = middle
+        else:
+            flipped = middle
+    return Decision(point, same * abs(step))
+
+
+def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
+    """Return a point (2,) of the plane over which the faces block, if there is one."""
+    slivers: list[_Regions] = []
+    for start in range(0, len(pairs), BATCH):
+        batch = pairs.chosen(slice(start, start + BATCH))
+        regions = _clipped({(0, 1): batch}, tolerance)[0, 1]
+        widest = int(regions.radii.argmax())
+        if regions.radii[widest] >= tolerance:
+            return regions.centres[widest]
+        slivers.append(regions)
+    return _wide_point(slivers, tolerance)
+
+
+def _wide_point(slivers: Sequence[_Regions], tolerance: float) -> np.ndarray | None:
+    """Return a point (2,) of the slivers' union that is wide enough around it, if there is one."""
+    if sum(float(regions.areas.sum()) for regions in slivers) < np.pi * tolerance**2:
+        return None
+    filled = [regions.polygons.chosen(regions.areas > 0.0) for regions in slivers]
+    return point_in_wide_union(filled, tolerance)

@@ -1,0 +1,127 @@
+"""Matrices kept by content: planning the same parts again takes as long as reading a file.
+
+The key is a digest of everything the matrices follow from: corners and faces of every part in the
+product frame, declared fasteners and tolerance, and the planner's own source, so that a new version
+never reads an old one's results. A file that cannot be read counts as absent.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import tempfile
+import zipfile
+from collections.abc import Mapping
+from dataclasses import asdict
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cell.products.product import Product
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.interference import Blocker, Interference
+from planning.feasibility.matrices import Matrices, matrices_of
+from planning.feasibility.solids import Solid, solids_of
+from planning.feasibility.threads import Thread
+
+
+def user_cache() -> Path:
+    """Return the user's cache folder: ``$XDG_CACHE_HOME/soft-jig``, or ``~/.cache/soft-jig``."""
+    root = os.environ.get("XDG_CACHE_HOME")
+    return (Path(root) if root else Path.home() / ".cache") / "soft-jig"
+
+
+def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> Matrices:
+    """Return the same as ``matrices_of``, from the folder if it has been computed before."""
+    solids = solids_of(product)
+    declared = product.contact_tolerance if tolerance is None else tolerance
+    file = folder / f"{key_of(product, solids, declared)}.npz"
+    found = load_matrices(file, solids)
+    if found is None:
+        found = matrices_of(product, tolerance, solids)
+        save_matrices(found, file)
+    return found
+
+
+def key_of(product: Product, solids: Mapping[str, Solid], tolerance: float | None) -> str:
+    """Return a digest of what the matrices of a product follow from."""
+    digest = hashlib.blake2b(digest_size=20)
+    digest.update(_source_digest())
+    pairs = sorted((f.part, f.into, f.pitch) for f in product.fasteners.values())
+    digest.update(json.dumps([tolerance, pairs]).encode())
+    for name, solid in solids.items():
+        digest.update(f"{name} {solid.vertices.shape} {solid.faces.shape}".encode())
+        digest.update(np.asarray(solid.vertices, float).tobytes())
+        digest.update(np.asarray(solid.faces, np.int64).tobytes())
+    return digest.hexdigest()
+
+
+@cache
+def _source_digest() -> bytes:
+    digest = hashlib.blake2b()
+    for file in sorted(Path(__file__).parent.glob("*.py")):
+        digest.update(file.read_bytes())
+    return digest.digest()
+
+
+def save_matrices(matrices: Matrices, file: Path) -> None:
+    """Write matrices; a folder that cannot be written to is no reason to fail."""
+    text = {
+        "names": list(matrices.solids),
+        "tolerance": matrices.tolerance,
+        "threads": [asdict(thread) for thread in matrices.threads],
+        "blockers": [[b.moving, b.staying, b.direction] for b in matrices.leaving.blockers],
+    }
+    arrays = {
+        "text": np.array(json.dumps(text)),
+        "contact": matrices.contact,
+        "contact_margin": matrices.contact_margin,
+        "free": np.array([matrices.leaving.free[j] for j in DIRECTIONS], np.int8),
+        "margin": np.array([matrices.leaving.margin[j] for j in DIRECTIONS]),
+        "hits": np.array([[*b.p_AoQ, b.travel] for b in matrices.leaving.blockers]).reshape(-1, 4),
+    }
+    try:
+        file.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile(dir=file.parent, suffix=".part", delete=False) as stream:
+            np.savez(stream, allow_pickle=False, **arrays)
+        os.replace(stream.name, file)
+    except OSError:
+        return
+
+
+def load_matrices(file: Path, solids: Mapping[str, Solid]) -> Matrices | None:
+    """Return what ``save_matrices`` wrote for these parts, or None if that is not there."""
+    try:
+        with np.load(file) as arrays:
+            return _restored({name: arrays[name] for name in arrays.files}, solids)
+    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+        return None
+
+
+def _restored(arrays: Mapping[str, Any], solids: Mapping[str, Solid]) -> Matrices | None:
+    text = json.loads(str(arrays["text"]))
+    if text["names"] != list(solids):
+        return None
+    blockers = tuple(
+        Blocker(moving, staying, direction, (x, y, z), travel)
+        for (moving, staying, direction), (x, y, z, travel) in zip(
+            text["blockers"], arrays["hits"].tolist(), strict=True
+        )
+    )
+    free = {j: arrays["free"][k].astype(int) for k, j in enumerate(DIRECTIONS)}
+    margin = {j: arrays["margin"][k] for k, j in enumerate(DIRECTIONS)}
+    threads = tuple(
+        Thread(**thread | {key: tuple(thread[key]) for key in ("axis", "p_AoT")})
+        for thread in text["threads"]
+    )
+    return Matrices(
+        solids,
+        text["tolerance"],
+        arrays["contact"],
+        arrays["contact_margin"],
+        Interference(free, blockers, margin),
+        threads,
+    )

@@ -1,0 +1,85 @@
+"""Checks of a product before planning: its parts must not share volume.
+
+Solid parts cannot overlap, so an overlap is a modelling error: except in a thread, which CAD often
+draws with the hole at the tap drill's diameter and the bolt at the nominal one. That overlap is cut
+out of the part that carries the thread, so that the bolt touches it line to line and can leave
+along its axis. A thread is one that the product declares, or one that looks like a thread.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from itertools import combinations
+
+from cell.errors import CellError
+from cell.products.product import Product
+from planning.feasibility.solids import Solid, boxes_apart
+from planning.feasibility.threads import THREAD_HEIGHT_PER_PITCH, Thread, find_thread, thickness
+
+
+def overlap_depth(a: Solid, b: Solid) -> float:
+    """Return how thick the thickest piece of common volume is [m].
+
+    Thickness is taken as 2 V / A: exact for a thin layer, which is what matters near the tolerance,
+    and of the right size (2/3 of the radius for a ball) for a gross overlap.
+    """
+    if boxes_apart(a, b, 0.0):
+        return 0.0
+    pieces = (a.manifold ^ b.manifold).decompose()
+    return max((thickness(piece) for piece in pieces if piece.volume() > 0.0), default=0.0)
+
+
+def without_overlaps(
+    product: Product,
+    solids: Mapping[str, Solid],
+    tolerance: float,
+    suspects: Iterable[tuple[str, str]] | None = None,
+) -> tuple[dict[str, Solid], tuple[Thread, ...]]:
+    """Return the solids with each bolt's thread cut out of the part it is driven into.
+
+    Args:
+        product: For its declared fasteners.
+        solids: Parts by name.
+        tolerance: Thickness of overlap that does not count [m].
+        suspects: Pairs to look at; all of them by default. Two parts of which one can leave the
+            other along some direction do not overlap.
+
+    Returns:
+        The solids, and the threads that were recognised.
+
+    Raises:
+        CellError: Two parts share a layer thicker than the tolerance, and it is no thread.
+    """
+    fitted = dict(solids)
+    threads: list[Thread] = []
+    for a, b in combinations(solids, 2) if suspects is None else suspects:
+        depth = overlap_depth(solids[a], solids[b])
+        if depth <= tolerance:
+            continue
+        thread = find_thread(solids[a], solids[b], tolerance)
+        bolt, nut = _declared(product, a, b, depth, tolerance) or _recognised(thread)
+        if not bolt:
+            raise CellError(
+                f"Parts '{a}' and '{b}' overlap by about {1e3 * depth:.3g} mm, more than the "
+                f"contact tolerance of {1e3 * tolerance:.3g} mm, and not as a bolt does in its "
+                "thread: correct their poses or shapes, or raise the tolerance."
+            )
+        threads += [thread] if thread else []
+        fitted[nut] = fitted[nut].without(solids[bolt])
+    return fitted, tuple(threads)
+
+
+def _declared(
+    product: Product, a: str, b: str, depth: float, tolerance: float
+) -> tuple[str, str] | None:
+    """Return (bolt, nut) if the product says that one of two parts is driven into the other."""
+    for bolt, nut in ((a, b), (b, a)):
+        fastener = product.fasteners.get(bolt)
+        if fastener is not None and fastener.into == nut:
+            deep = THREAD_HEIGHT_PER_PITCH * fastener.pitch + tolerance
+            return (bolt, nut) if depth <= deep else None
+    return None
+
+
+def _recognised(thread: Thread | None) -> tuple[str, str]:
+    return (thread.bolt, thread.nut) if thread else ("", "")

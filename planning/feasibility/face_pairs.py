@@ -1,0 +1,243 @@
+"""Which faces of two parts can hit each other along an axis: found by boxes, before any clipping.
+
+A pair counts when the projections' bounding rectangles overlap and the up-face can lie above the
+down-face somewhere in that overlap. The second test bounds the height difference, a linear
+function, over the rectangle: it drops the faces of two surfaces that lie on each other, of which a
+finely tessellated fit has tens of thousands.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planning.feasibility.clipping import Polygons, triangle_overlaps
+from planning.feasibility.envelope import Faces
+
+DENSE = 400_000  # Up to so many pairs, comparing all with all is faster than a grid.
+ON_EDGE = 1e-12  # [m] A point on the edge of a face's box is in it.
+FIRST_ROW, FIRST_COLUMN = 1, 2
+CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
+
+
+@dataclass(frozen=True, eq=False)
+class FacePairs:
+    """Faces that can hit each other, widest common rectangle first.
+
+    Attributes:
+        down: Faces of the moving part that face against the direction.
+        up: Faces of the staying part that face along it.
+        d, u: (p,) indices into them.
+        low, high: (p, 2) common rectangles [m].
+    """
+
+    down: Faces
+    up: Faces
+    d: np.ndarray
+    u: np.ndarray
+    low: np.ndarray
+    high: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.d)
+
+    def chosen(self, which: np.ndarray | slice) -> FacePairs:
+        """Return the pairs at the given indices."""
+        chosen = self.d[which], self.u[which], self.low[which], self.high[which]
+        return FacePairs(self.down, self.up, *chosen)
+
+    def near(self, point: np.ndarray, reach: float) -> FacePairs:
+        """Return the pairs whose common rectangle comes near a point (2,) of the plane [m]."""
+        meets = (self.low <= point + reach) & (self.high >= point - reach)
+        return self.chosen(np.flatnonzero(meets[:, 0] & meets[:, 1]))
+
+
+def blocked_regions(several: Sequence[FacePairs], height: float) -> Polygons:
+    """Return where each up-face is above its down-face by more than a height [m].
+
+    In the order of the pairs, empty where it is nowhere: one array for several pairs of parts,
+    since clipping few polygons takes as long as clipping many.
+    """
+    down = np.concatenate([pairs.down.corners[pairs.d] for pairs in several])
+    up = np.concatenate([pairs.up.corners[pairs.u] for pairs in several])
+    excess = np.concatenate([p.up.planes[p.u] - p.down.planes[p.d] for p in several])
+    regions = triangle_overlaps(down, up)
+    slope, offset = excess[:, None, :2], excess[:, 2] - height
+    return regions.clipped((regions.corners * slope).sum(axis=2) + offset[:, None])
+
+
+def heights_over(faces: Faces, points: np.ndarray) -> list[np.ndarray]:
+    """Return the heights at which faces cross the vertical line over each point (q, 2)."""
+    low, high = faces.low[:, :2], faces.high[:, :2]
+    point, face = box_pairs(points - ON_EDGE, points + ON_EDGE, low, high)
+    at = points[point]
+    x, y = (faces.corners[face, :, k] - at[:, k, None] for k in (0, 1))
+    turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
+    inside = (turns[:, 0] >= 0.0) & (turns[:, 1] >= 0.0) & (turns[:, 2] >= 0.0)
+    point, planes = point[inside], faces.planes[face[inside]]
+    heights = planes[:, 0] * at[inside, 0] + planes[:, 1] * at[inside, 1] + planes[:, 2]
+    order = np.argsort(point, kind="stable")
+    return np.split(heights[order], np.searchsorted(point[order], np.arange(1, len(points))))
+
+
+def paired(down: Faces, up: Faces, d: np.ndarray, u: np.ndarray) -> FacePairs:
+    """Return the pairs of down-faces d with up-faces u, given by their indices."""
+    low = np.maximum(down.low[d, :2], up.low[u, :2])
+    high = np.minimum(down.high[d, :2], up.high[u, :2])
+    return FacePairs(down, up, d, u, low, high)
+
+
+def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
+    """Return all pairs of faces, one of each, whose bounding rectangles overlap."""
+    if not len(a.low) or not len(b.low):
+        nothing = np.zeros(0, int)
+        return paired(a, b, nothing, nothing)
+    near = []
+    for own, other in ((a, b), (b, a)):
+        low, high = other.lower[:2], other.upper[:2]
+        meets = (own.low[:, :2] < high) & (own.high[:, :2] > low)
+        near.append(np.flatnonzero(meets[:, 0] & meets[:, 1]))
+    d, u = near
+    if not len(d) or not len(u):
+        return paired(a, b, d[:0], u[:0])
+    boxes = a.low[d, :2], a.high[d, :2], b.low[u, :2], b.high[u, :2]
+    row, column = box_pairs(*boxes)
+    return paired(a, b, d[row], u[column])
+
+
+def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
+    """Return the faces that can hit each other.
+
+    Args:
+        down: Faces of the moving part that face against the direction.
+        up: Faces of the staying part that face along it.
+        height: How far the up-face must rise above the down-face somewhere to count [m].
+    """
+    d, u = _near(down, up, height), _near(up, down, height)
+    if not len(d) or not len(u):
+        return paired(down, up, d[:0], u[:0])
+    boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
+    row, column = box_pairs(*boxes)
+    d, u = d[row], u[column]
+    chosen = up.high[u, 2] > down.low[d, 2] + height
+    d, u = d[chosen], u[chosen]
+    pairs = paired(down, up, d, u)
+    size = pairs.high - pairs.low
+    bound = excess_bound(up.planes[u] - down.planes[d], pairs.low, size)
+    chosen = np.flatnonzero(bound > height)
+    width = np.minimum(size[chosen, 0], size[chosen, 1])
+    return pairs.chosen(chosen[np.argsort(-width, kind="stable")])
+
+
+def excess_bound(excess: np.ndarray, low: np.ndarray, size: np.ndarray) -> np.ndarray:
+    """Return the largest value of linear functions over rectangles [m].
+
+    Args:
+        excess: (p, 3) planes as in ``Faces``.
+        low: (p, 2) lower corners of the rectangles [m].
+        size: (p, 2) their sizes [m].
+    """
+    half = size / 2
+    over_centre = np.einsum("ij,ij->i", excess[:, :2], low + half) + excess[:, 2]
+    return over_centre + np.einsum("ij,ij->i", np.abs(excess[:, :2]), half)
+
+
+def _near(faces: Faces, others: Faces, height: float) -> np.ndarray:
+    """Return indices of the faces within the others' common box, along the axis too."""
+    if not len(others.low):
+        return np.empty(0, int)
+    low, high = others.lower, others.upper
+    near = (faces.low[:, 0] < high[0]) & (faces.high[:, 0] > low[0])
+    near &= (faces.low[:, 1] < high[1]) & (faces.high[:, 1] > low[1])
+    # Down-faces below the others' top, or up-faces above the others' bottom.
+    if faces.facing < 0:
+        near &= faces.low[:, 2] < high[2] - height
+    else:
+        near &= faces.high[:, 2] > low[2] + height
+    return np.flatnonzero(near)
+
+
+def box_pairs(
+    low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of rectangles that overlap, one of (n, 2) with one of (m, 2) each."""
+    search = _all_pairs if len(low_a) * len(low_b) <= DENSE else _grid_pairs
+    return search(low_a, high_a, low_b, high_b)
+
+
+def _all_pairs(
+    low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find them by comparing all with all."""
+    mask = low_a[:, None, 0] < high_b[None, :, 0]
+    mask &= high_a[:, None, 0] > low_b[None, :, 0]
+    mask &= low_a[:, None, 1] < high_b[None, :, 1]
+    mask &= high_a[:, None, 1] > low_b[None, :, 1]
+    row, column = np.nonzero(mask)
+    return row, column
+
+
+def _grid_pairs(
+    low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Find them by sorting the rectangles into the cells of a grid over what both sides cover."""
+    origin = np.maximum(low_a.min(axis=0), low_b.min(axis=0))
+    end = np.minimum(high_a.max(axis=0), high_b.max(axis=0))
+    in_a, in_b = (
+        np.flatnonzero(((low < end) & (high > origin)).all(axis=1))
+        for low, high in ((low_a, high_a), (low_b, high_b))
+    )
+    if not len(in_a) or not len(in_b):
+        return in_a[:0], in_b[:0]
+    low_a, high_a, low_b, high_b = low_a[in_a], high_a[in_a], low_b[in_b], high_b[in_b]
+    low_a, low_b = np.maximum(low_a, origin), np.maximum(low_b, origin)
+    high_a, high_b = np.minimum(high_a, end), np.minimum(high_b, end)
+    cell = _cell_size(low_a, high_a, low_b, high_b)
+    columns = int((end[1] - origin[1]) / cell) + 1
+    face_a, cell_a, first_a = _cells_of((low_a - origin) / cell, (high_a - origin) / cell, columns)
+    face_b, cell_b, first_b = _cells_of((low_b - origin) / cell, (high_b - origin) / cell, columns)
+    order = np.argsort(cell_b, kind="stable")
+    face_b, cell_b, first_b = face_b[order], cell_b[order], first_b[order]
+    start, stop = (np.searchsorted(cell_b, cell_a, side) for side in ("left", "right"))
+    count = stop - start
+    at_b = np.repeat(start, count) + _ranges(count)
+    # A pair meets in each cell that both lie in; the first of them, in row and column, keeps it.
+    own = np.flatnonzero((np.repeat(first_a, count) | first_b[at_b]) == (FIRST_ROW | FIRST_COLUMN))
+    a, b = np.repeat(face_a, count)[own], face_b[at_b[own]]
+    meet = (low_a[a] < high_b[b]) & (high_a[a] > low_b[b])
+    meet = np.flatnonzero(meet[:, 0] & meet[:, 1])
+    return in_a[a[meet]], in_b[b[meet]]
+
+
+def _cell_size(*corners: np.ndarray) -> float:
+    """Return the edge of the grid's cells [m]: as small as keeps the faces in few cells each."""
+    low_a, high_a, low_b, high_b = corners
+    sizes = np.concatenate([high_a - low_a, high_b - low_b])
+    cell = max(float(np.sqrt(np.mean(np.prod(sizes, axis=1)))), 1e-9)
+    while np.prod(np.floor(sizes / cell) + 1.0, axis=1).mean() > CELLS_PER_FACE:
+        cell *= 1.5
+    return cell
+
+
+def _cells_of(
+    low: np.ndarray, high: np.ndarray, columns: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return a face index and a cell number for each cell that each rectangle reaches into.
+
+    And whether that cell is in the first row and the first column of those of the rectangle, as
+    ``FIRST_ROW`` and ``FIRST_COLUMN``, or-ed.
+    """
+    first, last = low.astype(int), high.astype(int)
+    span = last - first + 1
+    count = span[:, 0] * span[:, 1]
+    face = np.repeat(np.arange(len(low)), count)
+    row, column = np.divmod(_ranges(count), span[face, 1])
+    edge = np.where(row == 0, FIRST_ROW, 0) | np.where(column == 0, FIRST_COLUMN, 0)
+    return face, (first[face, 0] + row) * columns + first[face, 1] + column, edge
+
+
+def _ranges(count: np.ndarray) -> np.ndarray:
+    """Return 0 ... count[0] - 1, 0 ... count[1] - 1, and so on, in one array."""
+    return np.arange(count.sum()) - np.repeat(np.cumsum(count) - count, count)

@@ -1,0 +1,207 @@
+"""Beyond the six directions: where a part can leave at an angle, and how far it can move at all.
+
+Candidates come from contact. Where two faces lie on each other, the incoming part cannot move
+against the target's normal there; the directions that all those normals allow form a cone, and its
+edges (along two contact faces at once), its faces' normals and the axes of threads are tried, first
+against contact, then exactly against the whole shapes, as for the six.
+
+Local freedom is something else: a part may move some way and then hit. It is the height by which
+the faces ahead of it are clear, over their common projection, and infinite only if the part leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from planning.feasibility.blocking import decisions
+from planning.feasibility.clipping import triangle_overlaps
+from planning.feasibility.directions import DIRECTIONS, unit_vector
+from planning.feasibility.envelope import Envelope, envelope
+from planning.feasibility.face_pairs import overlapping_faces
+from planning.feasibility.solids import Solid, boxes_apart
+
+OPPOSED = 0.99  # Cosine of 8 degrees: facets of a coarse cylinder on a fine one.
+ALONG = 0.01  # Sine of 0.6 degrees: sliding along a face, within its rounding.
+SAME_DIRECTION = 0.9998  # Cosine of 1 degree.
+MOST_NORMALS = 12  # Largest contact faces that candidates are made from.
+MOST_CANDIDATES = 60  # Tried exactly, best clear of the contact faces first.
+ROWS = 400_000  # Pairs of boxes compared at once: bounds the memory to some MB.
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """How far some parts can move along a direction.
+
+    Attributes:
+        direction: (3,) unit vector in A.
+        travel: Until they hit [m]; infinite if they leave altogether.
+        hits: Name of the part that is hit; "" if they leave.
+    """
+
+    direction: tuple[float, float, float]
+    travel: float
+    hits: str
+
+    @property
+    def leaves(self) -> bool:
+        """Whether the parts leave to infinity."""
+        return not self.hits
+
+
+def freedoms(
+    incoming: Sequence[Solid],
+    target: Sequence[Solid],
+    tolerance: float,
+    axes: Sequence[Sequence[float]] = (),
+) -> list[Freedom]:
+    """Return how the incoming parts can move together while the target stays.
+
+    Args:
+        incoming: Parts that move as one.
+        target: Parts that stay.
+        tolerance: Overlap that does not block, gap that still touches [m].
+        axes: Further directions to try, for example of threads.
+
+    Returns:
+        Those of the six directions along which the parts can move further than the tolerance, then
+        the slanted ones along which they leave; furthest first within each.
+    """
+    six = [motion(incoming, target, unit_vector(j), tolerance) for j in DIRECTIONS]
+    moving = [freedom for freedom in six if freedom.travel > tolerance]
+    normals = contact_normals(incoming, target, tolerance)
+    slanted = [
+        motion(incoming, target, direction, tolerance)
+        for direction in candidates(normals, np.array(axes, float).reshape(-1, 3))
+    ]
+    leaving = [freedom for freedom in slanted if freedom.leaves]
+    return sorted(moving, key=lambda f: -f.travel) + leaving
+
+
+def motion(
+    incoming: Sequence[Solid], target: Sequence[Solid], direction: np.ndarray, tolerance: float
+) -> Freedom:
+    """Return how far parts can move along one direction (3,)."""
+    R = _rotation_to_z(direction)
+    views = [[_turned(solid, R) for solid in solids] for solids in (incoming, target)]
+    x, y, z = (float(value) for value in direction)
+    furthest = Freedom((x, y, z), np.inf, "")
+    for moving in views[0]:
+        for staying in views[1]:
+            decision = decisions([moving, staying], tolerance).get((0, 1))
+            if decision is None or decision.point is None:
+                continue
+            travel = travel_along(moving, staying, tolerance)
+            if travel < furthest.travel:
+                furthest = Freedom((x, y, z), travel, staying.name)
+    return furthest
+
+
+def travel_along(moving: Envelope, staying: Envelope, tolerance: float) -> float:
+    """Return how far a part moves up before it hits another in its way [m]; 0 if at once."""
+    pairs = overlapping_faces(moving.up, staying.down)
+    if not len(pairs):
+        return 0.0
+    regions = triangle_overlaps(moving.up.corners[pairs.d], staying.down.corners[pairs.u])
+    gap = staying.down.planes[pairs.u] - moving.up.planes[pairs.d]
+    heights = (regions.closed() * gap[:, None, :2]).sum(axis=2) + gap[:, 2:]
+    wide = (regions.count >= 3) & (regions.discs()[1] > tolerance / 4.0)
+    ahead = heights[wide & (heights.max(axis=1) > -tolerance)]
+    return max(0.0, float(ahead.min())) if len(ahead) else 0.0
+
+
+def contact_normals(
+    incoming: Sequence[Solid], target: Sequence[Solid], tolerance: float
+) -> np.ndarray:
+    """Return outward normals (n, 3) of the target where the incoming parts lie on it, widest first.
+
+    Normals within a degree of each other are one.
+    """
+    found, areas = [np.zeros((0, 3))], [np.zeros(0)]
+    for a in incoming:
+        for b in target:
+            if not boxes_apart(a, b, tolerance):
+                normals, area = _facing(a, b, tolerance)
+                found.append(normals)
+                areas.append(area)
+    return _distinct(np.concatenate(found), np.concatenate(areas))
+
+
+def candidates(normals: np.ndarray, axes: np.ndarray) -> np.ndarray:
+    """Return directions (n, 3) that no contact normal forbids, without the six.
+
+    Args:
+        normals: (k, 3) directions against which the parts cannot move.
+        axes: (m, 3) further ones to try, both ways.
+    """
+    chosen = normals[:MOST_NORMALS]
+    edges = [np.cross(a, b) for a, b in combinations(chosen, 2)]
+    tried = np.array([*chosen, chosen.sum(axis=0), *edges, *axes]).reshape(-1, 3)
+    lengths = np.linalg.norm(tried, axis=1)
+    tried = tried[lengths > 1e-3] / lengths[lengths > 1e-3, None]
+    tried = np.concatenate([tried, -tried])
+    slanted = np.abs(tried).max(axis=1) < SAME_DIRECTION
+    allowed = (tried @ normals.T >= -ALONG).all(axis=1) if len(normals) else slanted
+    tried = tried[slanted & allowed]
+    clear = (tried @ normals.T).min(axis=1) if len(normals) else np.zeros(len(tried))
+    return _distinct(tried, clear)[:MOST_CANDIDATES]
+
+
+def _facing(a: Solid, b: Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return b's normals where a face of a lies on a face of b, and the smaller face's area."""
+    faces = [_near_faces(solid, other, tolerance) for solid, other in ((a, b), (b, a))]
+    (corners_a, normals_a, areas_a), (corners_b, normals_b, areas_b) = faces
+    rows = max(1, ROWS // max(1, len(corners_b)))
+    found, areas = [np.zeros((0, 3))], [np.zeros(0)]
+    low_b, high_b = corners_b.min(axis=1), corners_b.max(axis=1)
+    for first in range(0, len(corners_a), rows):
+        part = corners_a[first : first + rows]
+        meet = normals_a[first : first + rows] @ normals_b.T < -OPPOSED
+        for k in range(3):
+            meet &= part[:, :, k].min(axis=1)[:, None] <= high_b[None, :, k] + tolerance
+            meet &= part[:, :, k].max(axis=1)[:, None] >= low_b[None, :, k] - tolerance
+        row, column = np.nonzero(meet)
+        offset = part[row].mean(axis=1) - corners_b[column].mean(axis=1)
+        close = np.abs((offset * normals_b[column]).sum(axis=1)) <= tolerance
+        found.append(normals_b[column[close]])
+        areas.append(np.minimum(areas_a[first + row[close]], areas_b[column[close]]))
+    return np.concatenate(found), np.concatenate(areas)
+
+
+def _near_faces(
+    solid: Solid, other: Solid, tolerance: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return corners (m, 3, 3), normals and areas of the faces near another part's box."""
+    corners = solid.vertices[solid.faces]
+    near = np.all(corners.min(axis=1) <= other.upper + tolerance, axis=1)
+    near &= np.all(corners.max(axis=1) >= other.lower - tolerance, axis=1)
+    corners = corners[near]
+    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    lengths = np.linalg.norm(doubled, axis=1)
+    kept = lengths > 0.0
+    return corners[kept], doubled[kept] / lengths[kept, None], lengths[kept] / 2.0
+
+
+def _distinct(directions: np.ndarray, weights: np.ndarray) -> np.ndarray:
+    """Return unit vectors without near repetitions, heaviest first."""
+    kept = np.zeros((0, 3))
+    for direction in directions[np.argsort(-weights, kind="stable")]:
+        if not len(kept) or (kept @ direction).max() < SAME_DIRECTION:
+            kept = np.vstack([kept, direction])
+    return kept
+
+
+def _rotation_to_z(direction: np.ndarray) -> np.ndarray:
+    """Return a rotation (3, 3) that brings a unit vector to +z."""
+    side = np.eye(3)[int(np.abs(direction).argmin())]
+    x = np.cross(side, direction)
+    x /= np.linalg.norm(x)
+    return np.array([x, np.cross(direction, x), direction])
+
+
+def _turned(solid: Solid, R: np.ndarray) -> Envelope:
+    turned = Solid(solid.name, solid.vertices @ R.T, solid.faces, solid.mass, R @ solid.p_AoG)
+    return envelope(turned, 2)

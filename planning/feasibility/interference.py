@@ -1,0 +1,160 @@
+"""Interference-free matrices M_j: which part can leave along j without hitting which other part.
+
+Part i moved along +d to infinity hits part k, which stays, exactly when over some point p of the
+plane across d the top of k lies above the bottom of i. Only i's down-faces and k's up-faces matter,
+nothing is stepped, faces that slide on each other do not block, and since the same pair (i below,
+k above) is met by moving k along -d, M_-d is the transpose of M_+d: three axes suffice.
+
+Blocked is what blocks by more than a tolerance: the region of p where the tops exceed the bottoms
+by more than ``FIT_TOLERANCE`` must be wide enough for a disc of that radius. So a shaft drawn line
+to line with its hole, or a bolt with its thread, leaves along its axis although the facets of the
+two surfaces cross by their sagitta.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from planning.feasibility.blocking import FRAGILE, Decision, decisions
+from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
+from planning.feasibility.envelope import PLANE, Envelope, Faces, envelope
+from planning.feasibility.face_pairs import heights_over
+from planning.feasibility.solids import Solid
+
+# [m] [A] Above the sagitta r (1 - cos(pi / n)) of usual facets (7 um for r 6 mm, n 64) and the
+# rounding of mesh files, below any overlap that matters: the decisions for the motor unit stay the
+# same from 1e-7 to 5e-4 m.
+FIT_TOLERANCE = 5e-5
+
+
+@dataclass(frozen=True)
+class Blocker:
+    """Evidence that one part cannot leave along a direction.
+
+    Attributes:
+        moving: Name of the part that is moved.
+        staying: Name of the part that it hits.
+        direction: In A, "+x" ... "-z".
+        p_AoQ: Point of the staying part that is hit [m].
+        travel: How far the moving part gets before it hits at that point [m].
+    """
+
+    moving: str
+    staying: str
+    direction: str
+    p_AoQ: tuple[float, float, float]
+    travel: float
+
+    def reversed(self) -> Blocker:
+        """Return the same hit with the other part moving the other way."""
+        p_AoQ = np.array(self.p_AoQ) - self.travel * unit_vector(self.direction)
+        x, y, z = (float(value) for value in p_AoQ)
+        other_way = opposite(self.direction)
+        return Blocker(self.staying, self.moving, other_way, (x, y, z), self.travel)
+
+
+@dataclass(frozen=True, eq=False)
+class Interference:
+    """Interference-free matrices with their evidence.
+
+    Attributes:
+        free: Per direction j an (n, n) int matrix M_j: M_j[i, k] = 1 if part i moved along j to
+            infinity does not hit part k, which stays; diagonals 0.
+        blockers: One per 0 off the diagonals.
+        margin: Per direction an (n, n) float matrix [m]: by how much the tolerance can change, up
+            or down, before the decision flips; what is ``FRAGILE`` of the tolerance or more is
+            given as that.
+    """
+
+    free: Mapping[str, np.ndarray]
+    blockers: tuple[Blocker, ...]
+    margin: Mapping[str, np.ndarray]
+
+
+def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> Interference:
+    """Return the six matrices M_j of n parts in matrix order."""
+    count = len(solids)
+    free = {j: 1 - np.eye(count, dtype=int) for j in DIRECTIONS}
+    margin = {j: np.full((count, count), FRAGILE * tolerance) for j in DIRECTIONS}
+    blockers = []
+    for forward in ("+x", "+y", "+z"):
+        views = [envelope(solid, axis_index(forward)) for solid in solids]
+        decided = decisions(views, tolerance)
+        for (i, k), decision in decided.items():
+            blocked = decision.point is not None
+            margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
+            free[forward][i, k] = free[opposite(forward)][k, i] = int(not blocked)
+        for hit in _evidence(views, forward, decided, tolerance):
+            blockers += [hit, hit.reversed()]
+    return Interference(free, tuple(blockers), margin)
+
+
+def first_hit(
+    moving: Envelope, staying: Envelope, direction: str, tolerance: float = FIT_TOLERANCE
+) -> Blocker | None:
+    """Return where a part moved along +x, +y or +z hits another, or None if it is free.
+
+    Args:
+        moving: Envelope along the axis of the direction.
+        staying: The same for the part that stays.
+        direction: "+x", "+y" or "+z".
+        tolerance: Height of overlap and radius of the region that do not count [m].
+    """
+    views = [moving, staying]
+    decided = {parts: d for parts, d in decisions(views, tolerance).items() if parts == (0, 1)}
+    return next(_evidence(views, direction, decided, tolerance), None)
+
+
+def _evidence(
+    views: Sequence[Envelope],
+    direction: str,
+    decided: Mapping[tuple[int, int], Decision],
+    tolerance: float,
+) -> Iterator[Blocker]:
+    """Yield where a part is hit, for each decision that has a blocked point."""
+    points = {parts: d.point for parts, d in decided.items() if d.point is not None}
+    seen = list(PLANE[axis_index(direction)])
+    floors = _heights([view.up for view in views], points, 0)
+    ceilings = _heights([view.down for view in views], points, 1)
+    tops = _heights([view.up for view in views], points, 1)
+    for (i, k), point in points.items():
+        height, travel = _nearest(floors[i, k], ceilings[i, k], tolerance)
+        if not np.isfinite(travel):  # Over this point the two share volume: they start blocked.
+            height, travel = float(np.max(tops[i, k], initial=views[k].low[2])), 0.0
+        p_AoQ = np.empty(3)
+        p_AoQ[seen] = [*point, height]
+        x, y, z = (float(value) for value in p_AoQ)
+        yield Blocker(views[i].name, views[k].name, direction, (x, y, z), travel)
+
+
+def _heights(
+    faces: Sequence[Faces], points: Mapping[tuple[int, int], np.ndarray], place: int
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return the heights of faces over each pair's point, of the pair's part at place 0 or 1."""
+    own: dict[int, list[tuple[int, int]]] = {}
+    for parts in points:
+        own.setdefault(parts[place], []).append(parts)
+    found: dict[tuple[int, int], np.ndarray] = {}
+    for part, pairs in own.items():
+        over = heights_over(faces[part], np.array([points[parts] for parts in pairs]))
+        found |= dict(zip(pairs, over, strict=True))
+    return found
+
+
+def _nearest(floors: np.ndarray, ceilings: np.ndarray, tolerance: float) -> tuple[float, float]:
+    """Return the height of the face that is hit and the travel to it [m]; infinite if none is.
+
+    Args:
+        floors: Heights of the moving part's up-faces over a point [m].
+        ceilings: Heights of the staying part's down-faces over it [m].
+        tolerance: By how much they may overlap [m].
+    """
+    gaps = ceilings[None] - floors[:, None]
+    ahead = np.where(gaps >= -tolerance, gaps, np.inf)
+    if not ahead.size or not np.isfinite(ahead).any():
+        return 0.0, np.inf
+    nearest = np.unravel_index(int(ahead.argmin()), ahead.shape)
+    return float(ceilings[nearest[1]]), max(0.0, float(ahead[nearest]))
