@@ -1,4 +1,9 @@
-"""The errors this project raises on purpose: one line names the culprit and the alternatives."""
+"""The errors this project raises on purpose: one line names the culprit and the alternatives.
+
+Two kinds, told apart by what a caller does about them: `InputError`, something that was given
+cannot be used and nothing was run (the command line's exit code 2); `RunFailure`, it ran and did
+not come out (exit code 1).
+"""
 
 from __future__ import annotations
 
@@ -7,10 +12,18 @@ from collections.abc import Iterable
 
 
 class CellError(Exception):
-    """Base of every error this project raises on purpose; the command line turns it into exit 2."""
+    """Base of every error this project raises on purpose."""
 
 
-class UnknownName(CellError):
+class InputError(CellError):
+    """Something that was given cannot be used: a name, a file, a number, a combination."""
+
+
+class RunFailure(CellError):
+    """What was asked for was tried and failed: a verdict, with its evidence."""
+
+
+class UnknownName(InputError):
     """A name that does not exist, with the names that do and the nearest one.
 
     Args:
@@ -26,12 +39,12 @@ class UnknownName(CellError):
         super().__init__(f"No {kind} '{name}'.{hint} Known: {', '.join(names)}.")
 
 
-class BadPart(CellError):
+class BadPart(InputError):
     """A part whose description cannot be used, with the reason."""
 
     def __init__(self, name: str, reason: str) -> None:
         super().__init__(f"Part '{name}': {reason}.")
 
 
-class BadOrder(CellError):
+class BadOrder(InputError):
     """An assembly order that does not list every part once."""

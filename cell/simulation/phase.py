@@ -1,4 +1,4 @@
-"""The vocabulary of execution: a phase commands the cell until its end condition holds.
+"""The vocabulary of execution: a phase commands devices until its end condition holds.
 
 An operation is a generator of phases; it receives the `Outcome` of each one back, so that the next
 phase is built from what was sensed. Nothing here steps a simulator.
@@ -6,13 +6,21 @@ phase is built from what was sensed. Nothing here steps a simulator.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import Protocol
+from enum import Enum
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
+
+from cell.errors import RunFailure
+
+if TYPE_CHECKING:
+    from cell.machines.driver import DriverReading
+    from cell.machines.gripper import GripperReading
+    from cell.simulation.simulation import Simulation
 
 
 class Motion(Protocol):
@@ -24,7 +32,7 @@ class Motion(Protocol):
         ...
 
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return joint angles (6,) [rad] and rates (6,) [rad/s]; the end holds, at rest."""
+        """Return joint angles (n,) [rad] and rates (n,) [rad/s]; the end holds, at rest."""
         ...
 
 
@@ -54,18 +62,15 @@ class Follow:
     """A joint target that a function computes every step from what is sensed: a servo.
 
     Attributes:
-        target: Returns joint angles (6,) and rates (6,).
+        target: Returns joint angles (n,) and rates (n,).
     """
 
     target: Callable[[Sensed], tuple[np.ndarray, np.ndarray]]
 
 
-ArmCommand = Motion | Impedance | Follow
-
-
 @dataclass(frozen=True)
 class Jaw:
-    """Drive the gripper to an opening, pressing with a force once something is in between.
+    """Drive a gripper to an opening, pressing with a force once something is in between.
 
     Attributes:
         opening: Distance between the tip pads to aim at [m].
@@ -77,38 +82,47 @@ class Jaw:
 
 
 @dataclass(frozen=True)
+class Spin:
+    """Turn a driver's spindle.
+
+    Attributes:
+        speed: About the bit's axis, positive tightens [rad/s].
+    """
+
+    speed: float
+
+
+ArmCommand = Motion | Impedance | Follow
+Command = ArmCommand | Jaw | Spin
+
+
+@dataclass(frozen=True)
 class Sensed:
     """What the end condition of a phase may look at; everything is measured, nothing assumed.
 
     Attributes:
         time: Time in the phase [s].
         step: Steps in the phase.
-        wrench: By arm name: (6,) torque [N m] and force [N] that the surroundings exert on the
-            tool, in W, less the reading at the latest taring.
-        jaw_opening: Distance between the tip pads [m].
-        jaw_rate: Its rate [m/s].
-        bit_push: Axial force of the driver's bit holder [N].
-        spindle_torque: Torque of the driver's motor [N m].
-        spindle_rate: [rad/s].
+        wrench: By arm: (6,) torque [N m] and force [N] that the surroundings exert on its tool, in
+            W, less the reading at the latest taring.
+        grippers: By device: opening and its rate.
+        drivers: By device: axial push, torque and speed of the spindle.
         finished: Whether every motion of the phase has come to its end.
-        X_WF: Pose of a frame.
-        X_WP: True pose of a part (for guards and verdicts; operations read the `PoseSensor`).
+        X_WF: Pose of a frame, from the joint encoders.
     """
 
     time: float
     step: int
-    wrench: dict[str, np.ndarray]
-    jaw_opening: float
-    jaw_rate: float
-    bit_push: float
-    spindle_torque: float
-    spindle_rate: float
+    wrench: Mapping[str, np.ndarray]
+    grippers: Mapping[str, GripperReading]
+    drivers: Mapping[str, DriverReading]
     finished: bool
     X_WF: Callable[[Frame], RigidTransform]
-    X_WP: Callable[[str], RigidTransform]
 
 
 Condition = Callable[[Sensed], bool]
+Guard = Callable[[Sensed], str | None]
+Event = Callable[["Simulation"], None]
 
 
 def motion_finished(sensed: Sensed) -> bool:
@@ -126,33 +140,35 @@ class Phase:
     """Commands that hold until the end condition does.
 
     Attributes:
-        name: For the log and the verdict, for example "motor: press".
+        kind: Which phase of its operation it is; the member's value is its name in log and verdict.
         until: End condition.
         timeout: The phase fails if it lasts longer [s].
-        left, right: Command of each arm; None holds still.
-        jaw: Gripper command; None keeps the last one.
-        spindle: Driver speed about the bit's axis, positive tightens [rad/s]; None keeps it.
+        subject: Name of the part it is about; "" for none.
+        commands: By device name; an arm without one holds still, a tool keeps its last one.
         guard: Returns a reason if the phase has failed, else None.
-        start: Events at the start of the phase: functions of the simulation.
-        every_step: Event after every step: thread catch, for example.
+        start: Events at the start of the phase.
+        every_step: Event after every step.
         awake: Names of the parts that are awake during the phase.
         fine_log: Log every step.
         tare: Whether the wrists read zero at the start; not in a phase that begins under load.
     """
 
-    name: str
+    kind: Enum
     until: Condition
     timeout: float
-    left: ArmCommand | None = None
-    right: ArmCommand | None = None
-    jaw: Jaw | None = None
-    spindle: float | None = None
-    guard: Callable[[Sensed], str | None] | None = None
-    start: tuple[Callable, ...] = ()
-    every_step: Callable | None = None
+    subject: str = ""
+    commands: Mapping[str, Command] = field(default_factory=dict)
+    guard: Guard | None = None
+    start: tuple[Event, ...] = ()
+    every_step: Event | None = None
     awake: frozenset[str] = frozenset()
     fine_log: bool = False
     tare: bool = True
+
+    @property
+    def name(self) -> str:
+        """For the log and the verdict, for example "motor: press"."""
+        return f"{self.subject}: {self.kind.value}" if self.subject else str(self.kind.value)
 
 
 @dataclass(frozen=True)
@@ -165,11 +181,11 @@ class Outcome:
     """
 
     sensed: Sensed
-    peak_force: dict[str, float]
+    peak_force: Mapping[str, float]
 
 
-class PhaseFailed(Exception):
-    """A phase that timed out, tripped its guard or broke the solver: a verdict, not an error.
+class PhaseFailed(RunFailure):
+    """A phase that timed out, tripped its guard or broke the solver.
 
     Attributes:
         phase: Its name.
