@@ -40,7 +40,7 @@ def test_motor_unit_is_complete() -> None:
     assert tuple(product.parts) == ("motor", "plate", *bolts)
     assert product.items() == ("motor", "plate", "bolts")
     assert product.orders == (("motor", "plate", "bolts"), ("plate", "bolts", "motor"))
-    assert product.members("bolts") == tuple(product.fasteners) == bolts
+    assert product.members("bolts") == tuple(product.screws) == bolts
     assert (product.up, product.contact_tolerance) == ("+z", pytest.approx(5e-5))
     for part in product.parts.values():
         assert part.mesh.is_volume and part.model and part.X_TrayP and part.grasps

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import trimesh
 
-from cell.errors import CellError
+from cell.errors import InputError
 from cell.products.mesh_io import check_mesh, joined
 
 GLTF_SUFFIX = ".glb"
@@ -36,7 +36,7 @@ def load_assembly(file: Path) -> dict[str, trimesh.Trimesh]:
     an order.
 
     Raises:
-        CellError: The file cannot be read, or holds no solid.
+        InputError: The file cannot be read, or holds no solid.
         BadPart: A solid is open, flat, or implausibly large or small.
     """
     scene = _scene(file)
@@ -52,7 +52,7 @@ def load_assembly(file: Path) -> dict[str, trimesh.Trimesh]:
         surface.apply_transform(X_AP)
         meshes[name] = check_mesh(surface, name)
     if not meshes:
-        raise CellError(f"'{file}' holds no solid.")
+        raise InputError(f"'{file}' holds no solid.")
     return dict(sorted(meshes.items(), key=lambda item: _natural(item[0])))
 
 
@@ -60,18 +60,18 @@ def _scene(file: Path) -> trimesh.Scene:
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise CellError(f"'{file}' cannot be read: {error.strerror}.") from error
+        raise InputError(f"'{file}' cannot be read: {error.strerror}.") from error
     binary = data
     if file.suffix.lower() != GLTF_SUFFIX and not (binary := _converted(data)):
-        raise CellError(f"'{file}' is not a STEP file that can be read.")
+        raise InputError(f"'{file}' is not a STEP file that can be read.")
     try:
         scene = trimesh.load_scene(
             io.BytesIO(binary), file_type="glb", process=False, merge_primitives=True
         )
     except Exception as error:  # The reader raises whatever it likes, in its own words.
-        raise CellError(f"'{file}' is not a glTF file that can be read.") from error
+        raise InputError(f"'{file}' is not a glTF file that can be read.") from error
     if not scene.geometry:
-        raise CellError(f"'{file}' holds no solid.")
+        raise InputError(f"'{file}' holds no solid.")
     return scene
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from cell.errors import BadPart, CellError, UnknownName
+from cell.errors import BadPart, InputError, UnknownName
 from cell.products.repair import repaired
 
 METERS_PER_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
@@ -68,11 +68,11 @@ def load_folder(folder: Path, units: str | None = None) -> dict[str, trimesh.Tri
     files = [f for f in sorted(folder.iterdir()) if f.suffix.lower() in MESH_SUFFIXES]
     if not files:
         kinds = ", ".join(MESH_SUFFIXES)
-        raise CellError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
+        raise InputError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
     without = [file.name for file in files if file.suffix.lower() not in UNIT_SUFFIXES]
     if units is None and without:
         known = ", ".join(METERS_PER_UNIT)
-        raise CellError(f"'{without[0]}' states no unit of length: add --units, one of {known}.")
+        raise InputError(f"'{without[0]}' states no unit of length: add --units, one of {known}.")
     meshes: dict[str, trimesh.Trimesh] = {}
     for file in files:
         if file.stem in meshes:
