@@ -6,7 +6,7 @@ frozen dataclass with `keys`, `read` and `parts`, added to `JOINT_TYPES`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any, ClassVar
 
@@ -48,7 +48,7 @@ class Fit:
         return self.shaft, self.hole
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> list[Fit]:
+    def read(cls, entry: Fields, product: Product) -> Sequence[Fit]:
         """Return the fit that an entry describes."""
         return [cls(**_shaft_in_hole(entry, product))]
 
@@ -76,7 +76,7 @@ class Press:
         return self.shaft, self.hole
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> list[Press]:
+    def read(cls, entry: Fields, product: Product) -> Sequence[Press]:
         """Return the press fit that an entry describes."""
         return [cls(**_shaft_in_hole(entry, product), force=entry.positive("force_N"))]
 
@@ -129,7 +129,7 @@ class Screw:
         return self.part, self.into, self.clamps
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> list[Screw]:
+    def read(cls, entry: Fields, product: Product) -> Sequence[Screw]:
         """Return the screw that an entry describes; for a group, one for each of its members."""
         screws = [
             cls(
@@ -175,7 +175,7 @@ class Rest:
         return self.part, self.on
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> list[Rest]:
+    def read(cls, entry: Fields, product: Product) -> Sequence[Rest]:
         """Return the joint that an entry describes; for a group, one for each of its members."""
         on = _part(entry, "on", product)
         return [cls(part, on) for part in product.members(entry.text("part"))]
