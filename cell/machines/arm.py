@@ -26,16 +26,10 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from pydrake.systems.primitives import ConstantVectorSource
 
 from cell.configuration.config import ArmConfig
+from cell.machines.arms import ArmModel
+from cell.machines.arms.ur import UR5E
 from cell.paths import model_url, new_parser
 
-JOINTS = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
 # Joint friction that stays when the position drive is off [N m s/rad]; [A], below 1 % of a
 # UR5e wrist joint's torque at working speed.
 TORQUE_MODE_DAMPING = 0.3
@@ -90,7 +84,7 @@ class Drive:
 
 @dataclass(frozen=True)
 class Arm:
-    """A six-joint arm with a tool on its flange.
+    """An arm with a tool on its flange.
 
     Attributes:
         name: "left" or "right".
@@ -101,6 +95,7 @@ class Arm:
         actuators: In the order of ``joints``.
         wrist: The weld between flange and tool: where the wrist wrench is read.
         config: Gains and home configuration.
+        model: Its type: kinematics and limits.
     """
 
     name: str
@@ -111,15 +106,26 @@ class Arm:
     actuators: tuple[JointActuator, ...]
     wrist: WeldJoint
     config: ArmConfig
+    model: ArmModel
+
+    @property
+    def tool_instance(self) -> ModelInstanceIndex:
+        """Model instance of the tool."""
+        return self.tool
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return self.model.dof
 
     @property
     def home(self) -> np.ndarray:
-        """Home configuration (6,) [rad]."""
+        """Home configuration (dof,) [rad]."""
         return np.deg2rad(self.config.home_deg)
 
     @property
     def effort_limits(self) -> np.ndarray:
-        """Torque limits (6,) [N m]."""
+        """Torque limits (dof,) [N m]."""
         return np.array([actuator.effort_limit() for actuator in self.actuators])
 
     def frame(self, name: str) -> Frame:
@@ -127,21 +133,21 @@ class Arm:
         return self.plant.GetFrameByName(name, self.tool)
 
     def positions(self, plant_context: Context) -> np.ndarray:
-        """Return the joint angles (6,) [rad]."""
+        """Return the joint angles (dof,) [rad]."""
         return self.plant.GetPositions(plant_context, self.instance)
 
     def velocities(self, plant_context: Context) -> np.ndarray:
-        """Return the joint rates (6,) [rad/s]."""
+        """Return the joint rates (dof,) [rad/s]."""
         return self.plant.GetVelocities(plant_context, self.instance)
 
     def jacobian(self, plant_context: Context, frame: Frame, p_FoC: np.ndarray) -> np.ndarray:
-        """Return J (6, 6) with V_WC = J v, for the point C of F; angular rows first, in W."""
+        """Return J (6, dof) with V_WC = J v, for the point C of F; angular rows first, in W."""
         world = self.plant.world_frame()
         jacobian = self.plant.CalcJacobianSpatialVelocity(
             plant_context, JacobianWrtVariable.kV, frame, p_FoC, world, world
         )
         start = self.joints[0].velocity_start()
-        return jacobian[:, start : start + len(JOINTS)]
+        return jacobian[:, start : start + self.dof]
 
     def use_position_drive(self) -> None:
         """Follow the commanded joint state stiffly."""
@@ -160,30 +166,37 @@ class Arm:
         return self.actuators[0].get_controller_gains().p == 0.0
 
 
-def add_arm(plant: MultibodyPlant, name: str, tool_model: str, config: ArmConfig) -> Arm:
-    """Add a UR5e with a tool to the plant, before it is finalized.
+def add_arm(
+    plant: MultibodyPlant,
+    name: str,
+    tool_model: str,
+    config: ArmConfig,
+    model: ArmModel = UR5E,
+) -> Arm:
+    """Add an arm with a tool to the plant, before it is finalized.
 
     Args:
         plant: Not finalized yet.
         name: "left" or "right"; the instances become ``<name>_arm`` and ``<name>_tool``.
         tool_model: Name of the SDF model of the tool; its frame ``mount`` meets the flange.
         config: Pose of the base, gains and home configuration.
+        model: Type of the arm.
     """
     parser = new_parser(plant)
-    (instance,) = parser.AddModelsFromUrl(model_url("ur5e"))
+    (instance,) = parser.AddModelsFromUrl(model_url(model.sdf))
     (tool,) = parser.AddModelsFromUrl(model_url(tool_model))
     plant.RenameModelInstance(instance, f"{name}_arm")
     plant.RenameModelInstance(tool, f"{name}_tool")
     X_WB: RigidTransform = config.X_WB
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link", instance), X_WB)
+    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(model.base_frame, instance), X_WB)
     wrist = plant.WeldFrames(
-        plant.GetFrameByName("flange", instance), plant.GetFrameByName("mount", tool)
+        plant.GetFrameByName(model.flange_frame, instance), plant.GetFrameByName("mount", tool)
     )
     plant.set_gravity_enabled(instance, False)
     plant.set_gravity_enabled(tool, False)
-    joints = tuple(plant.GetJointByName(joint, instance) for joint in JOINTS)
-    actuators = tuple(plant.GetJointActuatorByName(joint, instance) for joint in JOINTS)
-    arm = Arm(name, plant, instance, tool, joints, actuators, wrist, config)
+    joints = tuple(plant.GetJointByName(joint, instance) for joint in model.joints)
+    actuators = tuple(plant.GetJointActuatorByName(joint, instance) for joint in model.joints)
+    arm = Arm(name, plant, instance, tool, joints, actuators, wrist, config, model)
     arm.use_position_drive()
     for joint, angle in zip(joints, arm.home, strict=True):
         joint.set_default_angle(angle)
