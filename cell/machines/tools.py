@@ -10,11 +10,9 @@ from pydrake.multibody.tree import Joint, ModelInstanceIndex, PdControllerGains
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from cell.machines.arm import Drive
+from cell.machines.grippers import HAND_E
 
-# Position loop of the jaw: stiff against the grip force, soft against a width error: 0.5 mm of it
-# changes the force by 2.5 N [A].
-JAW_STIFFNESS = 2e4
-JAW_DAMPING = 200.0
+JAW_STIFFNESS, JAW_DAMPING = HAND_E.stiffness, HAND_E.damping
 # Speed loop of the spindle: at the seating speed of 7 rad/s it stalls at 0.7 N m, so that the bolt
 # still turns when the clutch trips at 0.5 N m and friction is fully mobilised [A].
 SPINDLE_GAIN = 0.1
@@ -23,8 +21,7 @@ FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
 FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 
-# The wide jaws stand back behind the tip pads, on both sides together [m] (see cell/cad/hand_e.py).
-JAW_SETBACK = {"tip": 0.0, "nose": 0.0, "wide": 0.024}
+JAW_SETBACK = HAND_E.setback
 
 
 @dataclass(frozen=True)
