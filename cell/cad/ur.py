@@ -1,23 +1,20 @@
-"""SDF of the UR5e arm: published kinematics and masses, own shapes.
+"""SDF of the six-axis arms: kinematics and masses of `cell.machines.arms.ur`, own shapes.
 
 Link frames are those of the maker's description, so that ``base_link`` is the controller's base
 frame, all joints turn about z, and ``flange`` is the tool0 frame (+z out of the flange). With all
 joints at zero the arm points along -x of its base.
 
-Sources: [R] Universal_Robots_ROS2_Description, commit 2221ec0f, for joint origins, masses, centres
-of mass, inertias and limits; [A] assumption; [D] derived. Shapes are drawn by eye from the link
-lengths [A]; the collision shapes enclose them by 1 to 3 mm and touch as points only.
+The shapes are drawn by eye on the ur5e [A]; its sisters have them stretched to their link lengths
+and as thick as their base is wide. The collision shapes enclose them by 1 to 3 mm and touch as
+points only.
 """
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from pathlib import Path
 
+from cell.cad.arm_model import ARM_CONTACT, BLUE, DARK, GREY, arm_skeleton
 from cell.cad.sdf_model import (
-    Color,
-    Contact,
     Inertia,
     Pose,
     SdfModel,
@@ -25,87 +22,32 @@ from cell.cad.sdf_model import (
     cylinder,
     pointing,
     rounded_cylinder,
-    tag,
 )
-
-GREY: Color = (0.70, 0.71, 0.72)
-BLUE: Color = (0.24, 0.48, 0.70)
-DARK: Color = (0.16, 0.17, 0.18)
-
-# Reflected rotor inertia 0.1 kg m2 on every joint [A]: the order of such drives; rotor times
-# ratio squared. It also keeps explicit impedance control stable at 1 ms [M].
-ROTOR_INERTIA = 1e-5
-GEAR_RATIO = 100.0
-JOINT_DAMPING = 0.5  # [N m s/rad] [A]: under 2 N m at full speed.
-MAX_SPEED = math.pi  # 180 deg/s, all joints [R].
-ARM_CONTACT = Contact("point", friction=0.3)  # [A] painted aluminium.
-
-HALF, FULL = math.pi, 2 * math.pi
+from cell.machines.arms.ur import UrArm
 
 
 @dataclass(frozen=True)
-class _Link:
-    """One moving link: inertia, its joint's origin in the parent link, and the joint's limits."""
+class Shape:
+    """What the drawing of an arm takes besides its Denavit-Hartenberg lengths.
 
-    name: str
-    joint: str
-    origin: Pose
-    inertia: Inertia
-    effort: float
-    range: float
+    Attributes:
+        girth: Thickness of everything relative to the ur5e: ratio of the base's diameters, 128,
+            149 and 190 mm [R data sheets].
+        shoulder_offset: Of the upper arm's tube beside the shoulder [m] [R "measured from model"].
+        elbow_offset: Of the forearm's tube beside the shoulder [m] [R "measured from model"].
+    """
+
+    girth: float
+    shoulder_offset: float
+    elbow_offset: float
 
 
-# The inertia of upper arm and forearm is published about an axis along x; here in link axes [R].
-LINKS = (
-    _Link(
-        "shoulder_link",
-        "shoulder_pan_joint",
-        Pose(z=0.1625),
-        Inertia(3.761, (0, -0.00193, -0.02561), (0.0102675, 0.0102675, 0.00666)),
-        150.0,
-        FULL,
-    ),
-    _Link(
-        "upper_arm_link",
-        "shoulder_lift_joint",
-        Pose(roll=math.pi / 2),
-        Inertia(8.058, (-0.2125, 0, 0.11336), (0.0151074, 0.1338858, 0.1338858)),
-        150.0,
-        FULL,
-    ),
-    _Link(
-        "forearm_link",
-        "elbow_joint",
-        Pose(x=-0.425),
-        Inertia(2.846, (-0.2422, 0, 0.0265), (0.004095, 0.0312094, 0.0312094)),
-        150.0,
-        HALF,
-    ),
-    _Link(
-        "wrist_1_link",
-        "wrist_1_joint",
-        Pose(x=-0.3922, z=0.1333),
-        Inertia(1.37, (0, -0.01634, -0.0018), (0.0025599, 0.0025599, 0.0021942)),
-        28.0,
-        FULL,
-    ),
-    _Link(
-        "wrist_2_link",
-        "wrist_2_joint",
-        Pose(y=-0.0997, roll=math.pi / 2),
-        Inertia(1.3, (0, 0.01634, -0.0018), (0.0025599, 0.0025599, 0.0021942)),
-        28.0,
-        FULL,
-    ),
-    _Link(
-        "wrist_3_link",
-        "wrist_3_joint",
-        Pose(y=0.0996, roll=math.pi / 2, pitch=math.pi, yaw=math.pi),
-        Inertia(0.365, (0, 0, -0.001159), (9.8904e-5, 9.8904e-5, 1.32117e-4)),
-        28.0,
-        FULL,
-    ),
-)
+# Offsets [R Universal_Robots_ROS2_Description, config/*/physical_parameters.yaml].
+SHAPES = {
+    "ur3e": Shape(0.86, 0.120, 0.027),
+    "ur5e": Shape(1.0, 0.138, 0.007),
+    "ur10e": Shape(1.275, 0.1762, 0.0393),
+}
 
 
 @dataclass(frozen=True)
@@ -131,61 +73,55 @@ class _Tube:
     clearance: float = 0.002
 
 
-TUBES = (
-    _Tube("base", (0, 0, 0), "+z", 0.092, 0.0725, "ring", 0.003),
-    _Tube("shoulder", (0, 0, -0.068), "+z", 0.130, 0.060, "round"),
-    _Tube("shoulder", (0, 0, 0), "-y", 0.074, 0.059, "ring"),
-    _Tube("upper_arm", (0, 0, 0.078), "+z", 0.118, 0.059, "cap"),
-    _Tube("upper_arm", (0, 0, 0.138), "-x", 0.425, 0.048),
-    _Tube("upper_arm", (-0.425, 0, 0.196), "-z", 0.122, 0.054, "ring"),
-    _Tube("forearm", (0, 0, 0.070), "-z", 0.121, 0.054, "cap"),
-    _Tube("forearm", (0, 0, 0.007), "-x", 0.3922, 0.0385),
-    _Tube("forearm", (-0.3922, 0, -0.042), "+z", 0.108, 0.041, "ring"),
-    _Tube("wrist_1", (0, 0, -0.063), "+z", 0.063, 0.039),
-    _Tube("wrist_1", (0, -0.050, 0), "+y", 0.097, 0.041, "cap"),
-    _Tube("wrist_2", (0, 0, -0.046), "+z", 0.046, 0.039),
-    _Tube("wrist_2", (0, 0.050, 0), "-y", 0.097, 0.041, "cap"),
-    _Tube("wrist_3", (0, 0, -0.048), "+z", 0.048, 0.0365, "ring", 0.001),
-)
-# Rounded lids on the blind ends of the upper arm's and forearm's elbow-side housings.
-LIDS = (
-    ("upper_arm", (-0.425, 0, 0.194), "+z", 0.054),
-    ("forearm", (-0.3922, 0, -0.040), "-z", 0.041),
-)
-
-
-def ur5e() -> SdfModel:
-    """Return the model."""
-    model = SdfModel("ur5e")
-    base = Inertia.of_cylinder(4.0, 0.0725, 0.092, (0, 0, 0.046))  # Mass [R]; shape [D].
-    model.link("base_link", base)
-    parent = "base_link"
-    for link in LINKS:
-        model.link(link.name, link.inertia, parent=parent, pose=link.origin)
-        _add_joint(model, link, parent)
-        parent = link.name
-    for index, tube in enumerate(TUBES):
+def ur(arm: UrArm) -> SdfModel:
+    """Return the model of an arm of the family."""
+    g = SHAPES[arm.name].girth
+    height = arm.d[0] - 0.0705 * g  # Of the base's tube.
+    base = Inertia.of_cylinder(arm.base_mass, 0.0725 * g, height, (0, 0, height / 2))  # Shape [D].
+    model = arm_skeleton(arm, base)
+    for index, tube in enumerate(_tubes(arm)):
         _add_tube(model, tube, index)
-    for index, (link, start, axis, radius) in enumerate(LIDS):
+    for index, (link, start, axis, radius) in enumerate(_lids(arm)):
         lid = model.mesh(f"lid_{index}", rounded_cylinder(radius, 0.014, 0.010))
         model.visual(f"{link}_link", f"lid_{index}", lid, BLUE, pointing(axis, start))
-    model.visual("base_link", "foot", cylinder(0.0745, 0.012), DARK, Pose(z=0.006))
-    model.frame("flange", "wrist_3_link")
+    model.visual("base_link", "foot", cylinder(0.0745 * g, 0.012), DARK, Pose(z=0.006))
+    model.frame(arm.flange_frame, arm.links[-1].name)
     return model
 
 
-def _add_joint(model: SdfModel, link: _Link, parent: str) -> None:
-    drive = [tag("drake:rotor_inertia", ROTOR_INERTIA), tag("drake:gear_ratio", GEAR_RATIO)]
-    model.joint(
-        link.joint,
-        "revolute",
-        parent,
-        link.name,
-        position=(-link.range, link.range),
-        velocity=MAX_SPEED,
-        effort=link.effort,
-        damping=JOINT_DAMPING,
-        extra=drive,
+def _tubes(arm: UrArm) -> tuple[_Tube, ...]:
+    """Return the tubes of an arm; neighbouring links are 4 mm times the girth apart."""
+    shape = SHAPES[arm.name]
+    g, side, elbow = shape.girth, shape.shoulder_offset, shape.elbow_offset
+    d1, _, _, d4, d5, d6 = arm.d
+    a2, a3 = arm.a[1], arm.a[2]
+    beside = side - elbow - 0.010 * g  # Length of the forearm's housing at the elbow.
+    across = d4 - elbow - 0.0183 * g  # The same at the wrist.
+    return (
+        _Tube("base", (0, 0, 0), "+z", d1 - 0.0705 * g, 0.0725 * g, "ring", 0.003),
+        _Tube("shoulder", (0, 0, -0.068 * g), "+z", 0.130 * g, 0.060 * g, "round"),
+        _Tube("shoulder", (0, 0, 0), "-y", side - 0.064 * g, 0.059 * g, "ring"),
+        _Tube("upper_arm", (0, 0, side - 0.060 * g), "+z", 0.118 * g, 0.059 * g, "cap"),
+        _Tube("upper_arm", (0, 0, side), "-x", -a2, 0.048 * g),
+        _Tube("upper_arm", (a2, 0, side + 0.058 * g), "-z", 0.122 * g, 0.054 * g, "ring"),
+        _Tube("forearm", (0, 0, side - 0.068 * g), "-z", beside, 0.054 * g, "cap"),
+        _Tube("forearm", (0, 0, elbow), "-x", -a3, 0.0385 * g),
+        _Tube("forearm", (a3, 0, elbow - 0.049 * g), "+z", across, 0.041 * g, "ring"),
+        _Tube("wrist_1", (0, 0, -0.063 * g), "+z", 0.063 * g, 0.039 * g),
+        _Tube("wrist_1", (0, 0.0497 * g - d5, 0), "+y", d5 - 0.0027 * g, 0.041 * g, "cap"),
+        _Tube("wrist_2", (0, 0, -0.046 * g), "+z", 0.046 * g, 0.039 * g),
+        _Tube("wrist_2", (0, d6 - 0.0496 * g, 0), "-y", d6 - 0.0026 * g, 0.041 * g, "cap"),
+        _Tube("wrist_3", (0, 0, -0.048 * g), "+z", 0.048 * g, 0.0365 * g, "ring", 0.001),
+    )  # fmt: skip
+
+
+def _lids(arm: UrArm) -> tuple[tuple[str, tuple[float, float, float], str, float], ...]:
+    """Return the rounded lids on the blind ends of upper arm and forearm, at elbow and wrist."""
+    shape = SHAPES[arm.name]
+    g, side, elbow = shape.girth, shape.shoulder_offset, shape.elbow_offset
+    return (
+        ("upper_arm", (arm.a[1], 0, side + 0.056 * g), "+z", 0.054 * g),
+        ("forearm", (arm.a[2], 0, elbow - 0.047 * g), "-z", 0.041 * g),
     )
 
 
@@ -203,14 +139,9 @@ def _add_tube(model: SdfModel, tube: _Tube, index: int) -> None:
     trunk = pointing(tube.axis, tube.start, body / 2)
     model.visual(link, name, cylinder(tube.radius, body), GREY, trunk)
     if tube.end == "ring":
-        ring = pointing(tube.axis, tube.start, tube.length - 0.0035)  # Proud of the end.
+        ring = pointing(tube.axis, tube.start, tube.length - 0.0035)  # Protrudes from the end.
         model.visual(link, f"{name}_ring", cylinder(tube.radius + 0.0008, 0.008), DARK, ring)
     radius = tube.radius + tube.clearance
     long = tube.length > 4 * tube.radius
     hull = capsule(radius, tube.length) if long else cylinder(radius, tube.length)
     model.collision(link, name, hull, ARM_CONTACT, middle)
-
-
-def write_models(folder: Path) -> None:
-    """Write the arm into ``folder``/ur5e."""
-    ur5e().write(folder)
