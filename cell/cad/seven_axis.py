@@ -1,8 +1,8 @@
 """SDF of the seven-axis arm: kinematics and masses of `cell.machines.arms.seven_axis`, own shapes.
 
-Two slender capsules per stretch of the arm, drawn by eye from the link lengths [A]; what is seen is
-what touches, as points only. The forearm is slimmer towards the wrist so that the flange passes it
-with the wrist bent as far as it goes.
+Capsules that overlap at the joints, drawn by eye from the link lengths [A]; what is seen is what
+touches, as points only. The forearm is slimmer towards the wrist so that the flange passes it with
+the wrist bent as far as it goes.
 """
 
 from __future__ import annotations
@@ -15,12 +15,12 @@ BASE_RADIUS, BASE_LENGTH = 0.078, 0.150
 # Link, axis, where the capsule's straight part begins and ends on it, radius [m].
 CAPSULES = (
     ("link_1", "+z", 0.075, 0.2025, 0.070),
-    ("link_2", "+y", 0.0, 0.130, 0.070),
-    ("link_3", "+z", 0.085, 0.2155, 0.065),
-    ("link_4", "+y", 0.0, 0.115, 0.065),
-    ("link_5", "+z", 0.065, 0.120, 0.055),
+    ("link_2", "+y", 0.0, 0.175, 0.070),
+    ("link_3", "+z", 0.030, 0.2155, 0.065),
+    ("link_4", "+y", 0.0, 0.155, 0.065),
+    ("link_5", "+z", 0.020, 0.120, 0.055),
     ("link_5", "+z", 0.120, 0.2155, 0.045),
-    ("link_6", "+y", 0.0, 0.030, 0.050),
+    ("link_6", "+y", 0.0, 0.050, 0.050),
 )
 FLANGE_RADIUS, FLANGE_START = 0.042, 0.010
 RING = 0.008  # Length of the dark ring around the flange.
