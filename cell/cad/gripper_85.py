@@ -10,7 +10,7 @@ from cell.cad.fingers import BLACK, BODY_CONTACT, STEEL, add_fingers
 from cell.cad.sdf_model import Inertia, Pose, SdfModel, box, cylinder, rounded_cylinder
 from cell.machines.grippers import GRIPPER_85
 
-BODY_RADIUS = 0.0375  # The ISO flange of 50 mm pitch circle has 63 mm, the coupler 75 mm.
+BODY_RADIUS = 0.0375
 RAIL = (0.149, 0.050, 0.030)
 BODY_LENGTH = GRIPPER_85.palm_length - RAIL[2]
 BODY_SHARE = 0.65  # Of the palm's mass: motor and gears [A].

@@ -31,8 +31,8 @@ class Shape:
     """What the drawing of an arm takes besides its Denavit-Hartenberg lengths.
 
     Attributes:
-        girth: Thickness of everything relative to the ur5e: ratio of the base's diameters, 128,
-            149 and 190 mm [R data sheets].
+        girth: Thickness of everything relative to the ur5e: ratio of the bases' diameters, about
+            128, 149 and 190 mm [A].
         shoulder_offset: Of the upper arm's tube beside the shoulder [m] [R "measured from model"].
         elbow_offset: Of the forearm's tube beside the shoulder [m] [R "measured from model"].
     """

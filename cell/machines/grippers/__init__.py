@@ -9,7 +9,7 @@ from cell.errors import UnknownName
 from cell.machines.grippers.base import GripperModel
 
 # [R AGH-CEAI/robotiq_hande_description, commit 4f66b057]: sizes, masses, stroke, speed, effort;
-# coupler 11 mm and 0.119 kg, body 99 mm and 0.86387 kg. Least force [R Hand-E manual].
+# coupler 11 mm and 0.119 kg, body 99 mm and 0.86387 kg. Least force [A].
 HAND_E = GripperModel(
     name="hand_e",
     travel=0.025,
