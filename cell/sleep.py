@@ -1,9 +1,9 @@
 """Bodies that sleep: locked where they are and without contact, they cost almost nothing.
 
 A sleeping body still weighs on what bears it. The contact force that it exerted on the jig's base
-or on the force plate in its last step goes on as a constant external force, so that the force plate
-reads the same whether a part sleeps or not. Whether a body sleeps is read from the Context: its joint is
-locked.
+or on the force plate in its last step goes on as a constant external force, so that the force
+plate reads the same whether a part sleeps or not. Whether a body sleeps is read from the Context:
+its joint is locked.
 
 The rule of the cell's own runs (measured: outcomes do not change): a part is awake while anything
 but its resting support touches it or is commanded to.

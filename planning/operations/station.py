@@ -45,6 +45,7 @@ def collision_model(config: CellConfig, product: Product) -> CollisionModel:
         populate,
         arm_clearance=motion.arm_clearance,
         obstacle_clearance=motion.obstacle_clearance,
+        hand=("left", "tip"),
     )
 
 
