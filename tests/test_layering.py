@@ -50,7 +50,11 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "cli": {"reporting", "plan", "assembly", "paper"},
     },
 }  # fmt: skip
-EVERYWHERE = {"cell": {"errors", "paths", "setting", "forces", "sleep"}, "planning": set(), "experiments": set()}
+EVERYWHERE = {
+    "cell": {"errors", "paths", "setting", "forces", "sleep"},
+    "planning": set(),
+    "experiments": set(),
+}
 EVERY_LAYER = [(package, layer) for package, layers in LAYERS.items() for layer in layers]
 MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
 
