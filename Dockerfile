@@ -1,9 +1,9 @@
 # The twin without a display: docker build -t soft-jig . && docker run -v "$PWD/out:/out" soft-jig
-FROM python:3.13-slim-trixie
+FROM python:3.13-slim-bookworm
 
-# The last two draw the pictures of the report.
+# Drake loads libglib; the last two draw the pictures of the report.
 RUN apt-get update \
- && apt-get install -y --no-install-recommends make libegl1 libgl1-mesa-dri \
+ && apt-get install -y --no-install-recommends make libglib2.0-0 libegl1 libgl1-mesa-dri \
  && rm -rf /var/lib/apt/lists/*
 
 WORKDIR /soft-jig
