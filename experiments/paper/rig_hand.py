@@ -45,9 +45,9 @@ class RigBench:
     posture: Posture
 
     @staticmethod
-    def build(config: CellConfig, product: Product, posture: Posture, bed: str) -> RigBench:
-        """Build it; ``bed`` is "soft" or "rigid"."""
-        return RigBench(build_push_rig(config, product, posture.part, bed), posture)
+    def build(config: CellConfig, product: Product, posture: Posture) -> RigBench:
+        """Build it."""
+        return RigBench(build_push_rig(config, product, posture.part), posture)
 
     def begin(self, disturbance: Disturbance) -> RigHand:
         """Put a stand with the part over the jig, and the open hand around it."""
@@ -95,14 +95,14 @@ class RigHand:
         if not simulation.lower(PRESS_SPEED, HOVER + DEEPEST, force):
             raise PhaseFailed("press", f"no resistance within {DEEPEST * 1e3:g} mm")
         simulation.begin("jam")
-        simulation.evacuate()
+        simulation.fix()
         for _ in range(round(JAM_TIME / simulation.time_step)):
             simulation.step()
-            if simulation.frozen:
+            if simulation.fixed:
                 break
         simulation.wait(HOLD_TIME)
-        if not simulation.frozen:
-            raise PhaseFailed("jam", f"the bag is still soft after {JAM_TIME:g} s")
+        if not simulation.fixed:
+            raise PhaseFailed("jam", f"the fixture does not hold after {JAM_TIME:g} s")
 
     def _grip(self) -> None:
         """Take the part from its stand."""

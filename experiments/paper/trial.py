@@ -218,7 +218,7 @@ def _place(hand: Hand, trial: Trial, settle: float) -> None:
 def _push(hand: Hand, push: Push, trial: Trial, watch: Watch) -> None:
     """Bring the closed hand beside the part, push, and let everything coast."""
     seen = hand.observer
-    line = push_line(seen.stage, push, seen.X_WJ, seen.X_WP)
+    line = push_line(seen.stage, seen.root, push, seen.X_WJ, seen.X_WP)
     hand.approach(line)
     hand.wait("ready", READY_TIME)
     seen.tare_hand()  # In free air: when the trial began, a jaw may have touched the part.
