@@ -43,7 +43,7 @@ format: $(INSTALLED)
 
 models: $(INSTALLED)
 	$(BIN)/python -m cell.cad
-	$(BIN)/python -m cell.configuration.config_yaml
+	$(BIN)/python -m cell.configuration
 
 clean:
 	rm -rf $(VENV) build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis

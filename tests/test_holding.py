@@ -169,7 +169,7 @@ def test_fastened_parts_do_not_fall():
     product = bolted()
     gravity, _ = gravity_of(product)
     assert gravity.dropped(("base", "lid", "bolt"), "-z") == []
-    loose, _ = gravity_of(replace(product, fasteners={}))
+    loose, _ = gravity_of(replace(product, joints=product.fits))
     assert loose.dropped(("base", "lid", "bolt"), "-z") != []
 
 

@@ -20,7 +20,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "fixtures": set(),
         "configuration": {"fixtures"},
         "machines": {"configuration", "workpieces"},
-        "cad": {"products"},
+        "cad": {"fixtures", "products"},
         "builder": {"configuration", "fixtures", "machines", "products", "workpieces"},
         "simulation": {
             "builder", "configuration", "fixtures", "machines", "products", "workpieces",

@@ -50,7 +50,7 @@ def key_of(product: Product, solids: Mapping[str, Solid], tolerance: float | Non
     """Return a digest of what the matrices of a product follow from."""
     digest = hashlib.blake2b(digest_size=20)
     digest.update(_source_digest())
-    pairs = sorted((f.part, f.into, f.pitch) for f in product.fasteners.values())
+    pairs = sorted((f.part, f.into, f.pitch) for f in product.screws.values())
     digest.update(json.dumps([tolerance, pairs]).encode())
     for name, solid in solids.items():
         digest.update(f"{name} {solid.vertices.shape} {solid.faces.shape}".encode())

@@ -74,7 +74,7 @@ def _declared(
 ) -> tuple[str, str] | None:
     """Return (bolt, nut) if the product says that one of two parts is driven into the other."""
     for bolt, nut in ((a, b), (b, a)):
-        fastener = product.fasteners.get(bolt)
+        fastener = product.screws.get(bolt)
         if fastener is not None and fastener.into == nut:
             deep = THREAD_HEIGHT_PER_PITCH * fastener.pitch + tolerance
             return (bolt, nut) if depth <= deep else None

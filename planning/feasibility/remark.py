@@ -52,7 +52,7 @@ class BoltRemark:
 def bolt_remarks(product: Product, geometry: Geometry) -> list[BoltRemark]:
     """Return the check for every part that lies under bolt heads."""
     carried: dict[str, list[str]] = {}
-    for name, fastener in product.fasteners.items():
+    for name, fastener in product.screws.items():
         carried.setdefault(fastener.clamps, []).append(name)
     return [
         BoltRemark(

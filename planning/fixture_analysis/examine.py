@@ -202,7 +202,7 @@ class Examiner:
 
     def _engagement(self, trial: Trial, name: str) -> float:
         """Return how far a bolt that is only put in may stand out and still be in its hole [m]."""
-        fastener = self.product.fasteners.get(name)
+        fastener = self.product.screws.get(name)
         if fastener is None or fastener.into in trial.body or fastener.clamps not in trial.body:
             return 0.0
         axis = unit_vector(trial.up)
@@ -281,7 +281,7 @@ class Examiner:
 
     def _load(self, trial: Trial, piece: tuple[str, ...], R_JA: np.ndarray, approach: str) -> Load:
         """Return what bringing one piece does to the body."""
-        fasteners = [self.product.fasteners[n] for n in piece if n in self.product.fasteners]
+        fasteners = [self.product.screws[n] for n in piece if n in self.product.screws]
         driven = len(fasteners) == len(piece) and all(f.into in trial.body for f in fasteners)
         force = self.setup.driver_force if driven else self.setup.insertion_force
         torque = max((f.torque for f in fasteners), default=0.0) if driven else 0.0

@@ -70,7 +70,7 @@ class Gravity:
         place = {name: number for number, name in enumerate(body)}
         joined = np.zeros((len(body), len(body)), bool)
         for bolt in body:
-            fastener = self.product.fasteners.get(bolt)
+            fastener = self.product.screws.get(bolt)
             if fastener and fastener.into in place and fastener.clamps in place:
                 joined[place[bolt], [place[fastener.into], place[fastener.clamps]]] = True
         return joined | joined.T
