@@ -133,7 +133,5 @@ def _mates(station: Station, part: str, X_WA: RigidTransform) -> bool:
         if not families.get(family):
             X_WJaw, frame = X_WP @ grasp.X_PJaw, arm.frame(grasp.jaw)
             touch = [(station.hand, part)]
-            families[family] = bool(
-                station.configurations(arm, frame, X_WJaw, arm.home, touch)
-            )
+            families[family] = bool(station.configurations(arm, frame, X_WJaw, arm.home, touch))
     return all(families.values())

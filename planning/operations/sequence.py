@@ -72,9 +72,7 @@ class _Sequence:
                     f"product has no joint between them that an operation makes ({known})."
                 )
 
-    def _take(
-        self, role: Role, parts: tuple[str, ...] = (), riders: tuple[str, ...] = ()
-    ) -> bool:
+    def _take(self, role: Role, parts: tuple[str, ...] = (), riders: tuple[str, ...] = ()) -> bool:
         """Take the step that the first operation of a role offers; return whether one does."""
         for operation in OPERATIONS.values():
             if operation.role is role:

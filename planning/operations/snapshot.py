@@ -72,9 +72,9 @@ class Snapshot:
 def take_snapshot(simulation: Simulation) -> Snapshot:
     """Return the true state of a running cell."""
     cell, root, context = simulation.cell, simulation.root, simulation.context
-    threads = cell.threads.items()
+    sensors = {name: arm.wrist for name, arm in cell.arms.items()}
     wrenches = {}
-    for name, sensor in {**cell.wrists, "force_plate": cell.force_plate}.items():
+    for name, sensor in {**sensors, "force_plate": cell.force_plate}.items():
         reading = sensor.read(context)
         p_WS = sensor.weld.frame_on_child().CalcPoseInWorld(context).translation()
         wrenches[name] = Wrench(reading[:3], reading[3:], p_WS)
@@ -86,10 +86,10 @@ def take_snapshot(simulation: Simulation) -> Snapshot:
         X_WJ=cell.fixture.pose(context),
         X_WP={part.part.name: part.X_WP(context) for part in cell.parts},
         V_WP={part.part.name: part.velocity(context) for part in cell.parts},
-        X_HF={name: thread.X_HF(context) for name, thread in threads},
-        turns={name: float(thread.turns(root)) for name, thread in threads},
-        clamp={name: thread.clamp_force(root) for name, thread in threads},
-        spindle_torque=cell.driver.tool.torque(context),
+        X_HF={bolt: cell.threads[bolt].X_HF(context) for bolt in cell.threads},
+        turns={bolt: float(cell.threads.turns(root, bolt)) for bolt in cell.threads},
+        clamp={bolt: cell.threads[bolt].clamp_force(context) for bolt in cell.threads},
+        spindle_torque=cell.driver.tool.read(context).torque,
         wrenches=wrenches,
         hand_clearance={fit.shaft: _distance(cell, query, fit.shaft) for fit in cell.product.fits},
     )

@@ -12,9 +12,11 @@ from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame, SpatialInertia
 from pydrake.systems.framework import Context
 
-from cell.builder import Cell, add_arms, add_workcell
+from cell.builder import Cell
 from cell.configuration.config import CellConfig
 from cell.machines.arm import Arm
+from cell.machines.devices import add_arms, make_drives
+from cell.machines.workcell import add_workcell
 from cell.products.product import Part
 from cell.workpieces.parts import add_parts
 from planning.motion.collision_model import CollisionModel, Surroundings
@@ -38,16 +40,16 @@ def collision_model(cell: Cell, config: CellConfig) -> CollisionModel:
     """
 
     def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
-        _, jig_base = add_workcell(plant, config, cell.product)
+        workcell = add_workcell(plant, config, cell.product.tray)
         plant.RegisterCollisionGeometry(
-            jig_base,
+            workcell.base,
             RigidTransform(),
             cell.fixture.obstacle(),
             "fixture",
             CoulombFriction(1.0, 1.0),
         )
-        arms = add_arms(plant, config)
-        add_parts(plant, scene_graph, cell.product, config.workcell.X_WT)
+        arms = add_arms(plant, config, make_drives(config))
+        add_parts(plant, cell.product, config.workcell.X_WT)
         return arms
 
     motion = config.motion
@@ -176,7 +178,7 @@ class Station:
     def surroundings(
         self, may_touch: Iterable[tuple[str, str]] = (), clearance: float | None = None
     ) -> Surroundings:
-        """Return everything as it is believed to be now; a part that was never seen is not there."""
+        """Return everything as it is believed to be now, without parts that were never seen."""
         X_HandW = self.tool_pose(self.holder, "tip").inverse()
         others = [name for name in self.belief.estimates if name not in self.in_hand]
         return Surroundings(

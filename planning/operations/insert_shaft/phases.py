@@ -112,9 +112,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     )
     # Once more with the part over its place: it may have turned in the grip on the way.
     seen = (*station.in_hand, fit.shaft)
-    yield from look(
-        station, InsertPhase.LOOK_OVER_SHAFT, part, seen, awake=held, guard=holding
-    )
+    yield from look(station, InsertPhase.LOOK_OVER_SHAFT, part, seen, awake=held, guard=holding)
     X_JawP, X_WGoal = jaw_to_part(station, part, reach.grasp), goal_pose(station, fit)
     near = raised(X_WGoal, fit.depth + NEAR) @ X_JawP.inverse()
     yield Phase(
@@ -201,7 +199,9 @@ def _insert(
             return height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3
 
         length = config.search_radius**2 * np.pi / config.search_pitch
-        yield soft(InsertPhase.SEARCH, config.search_force, search, found, length / config.search_speed)
+        yield soft(
+            InsertPhase.SEARCH, config.search_force, search, found, length / config.search_speed
+        )
         again = descent(X_WSeat, mouth - 1e-3, config, height)
         outcome = yield soft(InsertPhase.INSERT_AGAIN, config.force_limit, *again)
     # Where the part has found its place: a spring that still pulls sideways would wedge it there.

@@ -12,7 +12,7 @@ from planning.operations.record import Arrays, StepRecord
 
 
 def plots(cell: Cell, record: StepRecord, log: Arrays) -> list[Plot]:
-    """Return the force along and across the axis, with the downward force at which the arm yields."""
+    """Return the force along and across the axis, with the force at which the arm yields."""
     if not record.of(fit_of(record).hole, *SOFT):
         return []
     depth, force = insertion_curve(cell, record, log)

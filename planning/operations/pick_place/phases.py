@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cell.products.product import Grasp
 from cell.simulation.events import fix_part, prepare_fixture, receive_part
-from cell.simulation.phase import Condition, Phase, Sensed, after, motion_finished
+from cell.simulation.phase import Condition, Phase, after, motion_finished
 from planning.motion.kinematics import Unreachable
 from planning.operations.grasping import (
     Reach,
@@ -105,9 +105,7 @@ def pick_place(
         awake=awake,
     )
     # The wrist is tared at rest: the braking arm feels 2 N of its own [M].
-    yield Phase(
-        PlacePhase.HOVER, after(HOVER_TIME), 1.0, subject=part, guard=holding, awake=awake
-    )
+    yield Phase(PlacePhase.HOVER, after(HOVER_TIME), 1.0, subject=part, guard=holding, awake=awake)
     down = HOVER + DEEPEST
     force = station.config.placement.press_force
     yield Phase(

@@ -181,5 +181,7 @@ def _stroke(station: Station, q_start: np.ndarray, line: PushLine) -> JointMotio
     fastest = np.max(np.abs(v) / limits, axis=0)
     if fastest.max() > 1.0:
         joint = arm.joints[int(fastest.argmax())].name()
-        raise NoPath(arm.name, f"{joint} would turn at {fastest.max():.1f} times its limit in a push")
+        raise NoPath(
+            arm.name, f"{joint} would turn at {fastest.max():.1f} times its limit in a push"
+        )
     return JointMotion(time, q, v)

@@ -96,9 +96,7 @@ def thread_curve(cell: Cell, bolt: str, rows: Arrays) -> tuple[np.ndarray, np.nd
     return angle, height, rows["clamp_force"][caught, column]
 
 
-def advance(
-    screw: Screw, angle: np.ndarray, height: np.ndarray, clamp: np.ndarray
-) -> Measured:
+def advance(screw: Screw, angle: np.ndarray, height: np.ndarray, clamp: np.ndarray) -> Measured:
     """Return the advance per turn while the bolt runs free, and the angle from snug to trip."""
     if len(angle) < 3:
         return {}

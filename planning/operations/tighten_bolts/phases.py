@@ -7,7 +7,7 @@ way.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -142,9 +142,7 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
         for bolt in star_order(station, step.parts):
             yield from tighten_bolt(station, bolt)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
-    yield Phase(
-        DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly
-    )
+    yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
 
 
 def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]:
@@ -152,7 +150,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     driver, spindle = station.driver, station.driver.tool.name
     config, root = station.config, station.root
     tip, screw = driver.frame("tool_tip"), station.cell.product.screws[bolt]
-    thread, awake = station.cell.threads[bolt], _awake(station, bolt)
+    threads, awake = station.cell.threads, _awake(station, bolt)
 
     yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
     holding = [(station.hand, part) for part in station.fixed]
@@ -177,7 +175,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         DrivePhase.BIT_IN,
         # That the hex has dropped into the socket is told by the model of the joint between them,
         # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
-        lambda sensed: sensed.finished and thread.bit_engaged(root),
+        lambda sensed: sensed.finished and threads.bit_engaged(root, bolt),
         timeout=5.0,
         subject=bolt,
         commands={
