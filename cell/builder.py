@@ -7,33 +7,32 @@ its own. A program that steps either with Drake's own `Simulator` needs one line
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import RigidBody
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
 
 from cell.configuration.config import CellConfig
-from cell.errors import InputError, UnknownName
+from cell.errors import UnknownName
 from cell.fixtures import add_fixture
 from cell.fixtures.base import Fixture
 from cell.forces import ForceSum
 from cell.machines.arm import Arm
-from cell.machines.devices import add_arms, arm_drives
-from cell.machines.drive import ArmDrive, JointDrive
+from cell.machines.devices import add_arms, make_drives
+from cell.machines.drive import JointDrive
+from cell.machines.driver import Driver
 from cell.machines.jig_base import JigBase, set_sliding_friction
 from cell.machines.sensors import WrenchSensor
-from cell.machines.workcell import Workcell, add_workcell
+from cell.machines.workcell import add_workcell
 from cell.monitor import Monitor, StepCounter
-from cell.ports import PartPoses, Ports
+from cell.ports import Ports, add_part_poses
 from cell.products.product import Product
 from cell.sleep import Sleep
 from cell.workpieces.parts import Parts, add_parts
-from cell.workpieces.thread import add_thread
-from cell.workpieces.threads import Threads
+from cell.workpieces.threads import Threads, add_threads
 
 Extend = Callable[[MultibodyPlant, SceneGraph], None]
 
@@ -43,7 +42,6 @@ class Cell:
     """Handles to a built cell. Holding it keeps everything alive that a simulation needs.
 
     Attributes:
-        name: Prefix of the cell's systems in the diagram; "" for none.
         config: What it was built from.
         product: The product whose parts are in it.
         plant, scene_graph: Plain Drake.
@@ -58,7 +56,6 @@ class Cell:
         diagram: The built diagram; None until the caller of `add_cell` has built theirs.
     """
 
-    name: str
     config: CellConfig
     product: Product
     plant: MultibodyPlant
@@ -144,44 +141,56 @@ def add_cell(
     Raises:
         InputError: A product without simulation models, an unknown device or fixture.
     """
-    check_simulable(product)
+    product.check_simulable()
     prefix = f"{name}_" if name else ""
-    time_step = config.simulation.time_step
-    counter = builder.AddNamedSystem(f"{prefix}steps", StepCounter(time_step))
-    drives = arm_drives(config)
-    for device, drive in drives.items():
+    counter = builder.AddNamedSystem(f"{prefix}steps", StepCounter(config.simulation.time_step))
+    drives = make_drives(config)
+    for arm, own in drives.items():
         # Before the plant: see `cell.machines.drive`.
-        builder.AddNamedSystem(f"{prefix}{device}_drive", drive)
+        builder.AddNamedSystem(f"{prefix}{arm}_drive", own.arm)
+        builder.AddNamedSystem(f"{prefix}{own.tool_name}_drive", own.tool)
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
     plant.set_name(f"{prefix}plant")
     scene_graph.set_name(f"{prefix}scene_graph")
-    workcell = add_workcell(plant, config, product)
+    workcell = add_workcell(plant, config, product.tray)
     if not config.workcell.jig_base_fixed:
         for sliding in (workcell.plate, workcell.base):
             set_sliding_friction(plant, scene_graph, sliding, config.push.base_friction)
     arms = add_arms(plant, config, drives)
     parts = add_parts(plant, product, config.workcell.X_WT)
-    threads = add_threads(plant, scene_graph, product, parts, arms)
-    fixture = add_fixture(plant, scene_graph, workcell.base, config)
+    drivers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Driver)]
+    threads = add_threads(plant, scene_graph, product, parts, next(iter(drivers), None))
+    kind = config.workcell.fixture
+    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig)
     for part in parts:
         fixture.add_part(plant, part.body, part.part.mesh)
     if extend is not None:
         extend(plant, scene_graph)
     plant.Finalize()
-    forces = builder.AddNamedSystem(f"{prefix}forces", ForceSum(("fixture", "sleep", "external")))
-    fixture.set_name(f"{prefix}{fixture.name}")
-    builder.Connect(fixture.add_to_builder(builder), forces.GetInputPort("fixture"))
-    bearers = [workcell.base, workcell.plate]
-    sleeper = Sleep(plant, scene_graph, bearers, fixture.forces_from)
-    builder.AddNamedSystem(f"{prefix}sleep", sleeper)
+
+    sleeper = Sleep(plant, scene_graph, (workcell.base, workcell.plate))
+    force_plate = WrenchSensor(plant, workcell.plate_weld)
+    forces = ForceSum(("fixture", "sleep", "external"))
+    systems: dict[str, LeafSystem] = {
+        kind: fixture,
+        "threads": threads,
+        "sleep": sleeper,
+        "forces": forces,
+    }
+    for system_name, system in systems.items():
+        builder.AddNamedSystem(f"{prefix}{system_name}", system)
+    builder.Connect(fixture.GetOutputPort("applied_forces"), forces.GetInputPort("fixture"))
     builder.Connect(sleeper.get_output_port(), forces.GetInputPort("sleep"))
     builder.Connect(forces.get_output_port(), plant.get_applied_spatial_force_input_port())
-    builder.AddNamedSystem(f"{prefix}threads", threads)
-    force_plate = builder.AddNamedSystem(
-        f"{prefix}force_plate_sensor", WrenchSensor(plant, workcell.plate_weld)
-    )
-    force_plate.connect(builder)
-    ports = _connect(builder, prefix, arms, parts, force_plate, fixture, plant)
+    ports = Ports()
+    for arm in arms.values():
+        ports.add(*arm.connect(builder, prefix))
+    ports.add({}, {"force_plate": force_plate.connect(builder, f"{prefix}force_plate")})
+    ports.add({}, add_part_poses(builder, f"{prefix}part_poses", plant, parts))
+    for port in fixture.inputs():
+        ports.inputs[f"jig.{port.get_name()}"] = port
+    for port in fixture.outputs():
+        ports.outputs[f"jig.{port.get_name()}"] = port
     ports.inputs["external_forces"] = forces.GetInputPort("external")
     jig_base = JigBase(config, plant, workcell.base, workcell.plate, sleeper)
 
@@ -191,7 +200,6 @@ def add_cell(
         fixture.install(root)
 
     return Cell(
-        name=name,
         config=config,
         product=product,
         plant=plant,
@@ -205,4 +213,13 @@ def add_cell(
         force_plate=force_plate,
         ports=ports,
         monitor=Monitor(counter, reset, (fixture, threads)),
+    )
+
+
+def plant_config(config: CellConfig) -> MultibodyPlantConfig:
+    """Return how the plant is stepped and what contact it has."""
+    return MultibodyPlantConfig(
+        time_step=config.simulation.time_step,
+        discrete_contact_approximation=config.simulation.contact_approximation,
+        contact_model="hydroelastic_with_fallback",
     )

@@ -53,7 +53,7 @@ class StepCounter(LeafSystem):
     def _check(self, context: Context) -> None:
         if self.steps_at(context) > int(context.get_discrete_state(0).value()[0]) + 1:
             raise InputError(
-                "The cell is stepped without its monitor: bag, threads and sleepers would not work. "
+                "The cell is stepped without its monitor: neither fixture nor threads would work. "
                 "Call simulator.set_monitor(cell.monitor) before the first step."
             )
 

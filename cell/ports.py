@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from pydrake.common.value import AbstractValue
 from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import (
     Context,
@@ -17,6 +18,7 @@ from pydrake.systems.framework import (
 )
 
 from cell.errors import InputError, UnknownName
+from cell.workpieces.parts import Parts
 
 
 @dataclass(frozen=True)
@@ -28,8 +30,13 @@ class Ports:
         outputs: What the cell senses; part poses are the truth.
     """
 
-    inputs: Mapping[str, InputPort] = field(default_factory=dict)
-    outputs: Mapping[str, OutputPort] = field(default_factory=dict)
+    inputs: dict[str, InputPort] = field(default_factory=dict)
+    outputs: dict[str, OutputPort] = field(default_factory=dict)
+
+    def add(self, inputs: Mapping[str, InputPort], outputs: Mapping[str, OutputPort]) -> None:
+        """Add ports to both kinds."""
+        self.inputs.update(inputs)
+        self.outputs.update(outputs)
 
     def connect(self, builder: DiagramBuilder, source: OutputPort, name: str) -> None:
         """Connect a caller's output to an input of the cell.
@@ -75,11 +82,23 @@ class PartPoses(LeafSystem):
         poses = AbstractValue.Make([RigidTransform()])
         port = self.DeclareAbstractInputPort("body_poses", poses)
         for name, body in bodies.items():
-            index = int(body.index())
 
-            def calc(context: Context, output: AbstractValue, index: int = index) -> None:
+            def calc(
+                context: Context, output: AbstractValue, index: int = int(body.index())
+            ) -> None:
                 output.set_value(port.Eval(context)[index])
 
             self.DeclareAbstractOutputPort(
                 f"{name}.pose", lambda: AbstractValue.Make(RigidTransform()), calc
             )
+
+
+def add_part_poses(
+    builder: DiagramBuilder, name: str, plant: MultibodyPlant, parts: Parts
+) -> dict[str, OutputPort]:
+    """Add `PartPoses` under a name, connected to the finalized plant; return its outputs."""
+    poses = PartPoses({part.part.name: part.body for part in parts})
+    builder.AddNamedSystem(name, poses)
+    builder.Connect(plant.get_body_poses_output_port(), poses.get_input_port())
+    names = [f"{part.part.name}.pose" for part in parts]
+    return {name: poses.GetOutputPort(name) for name in names}

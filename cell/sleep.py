@@ -1,9 +1,9 @@
 """Bodies that sleep: locked where they are and without contact, they cost almost nothing.
 
-A sleeping body still weighs on what bears it. The force that it exerted on the jig's base or on the
-force plate in its last step goes on as a constant external force, so that the force plate reads the
-same whether a part sleeps or not. Whether a body sleeps is read from the Context: its joint is
-locked.
+A sleeping body still weighs on what bears it. The contact force that it exerted on the jig's base
+or on the force plate in its last step goes on as a constant external force, so that the force
+plate reads the same whether a part sleeps or not. Whether a body sleeps is read from the Context:
+its joint is locked.
 
 The rule of the cell's own runs (measured: outcomes do not change): a part is awake while anything
 but its resting support touches it or is commanded to.
@@ -11,7 +11,7 @@ but its resting support touches it or is commanded to.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -49,23 +49,19 @@ class Sleep(LeafSystem):
     Output port ``loads``: the forces that sleeping bodies exert on what bears them.
 
     Args:
-        plant: The plant.
+        plant: The finalized plant.
         scene_graph: Its scene graph.
         bearers: Bodies whose load a sensor feels: the jig's base, the force plate.
-        forces_from: Returns what the jig's base feels of a body besides contact, given the root
-            context and the body.
     """
 
     def __init__(
-        self,
-        plant: MultibodyPlant,
-        scene_graph: SceneGraph,
-        bearers: Sequence[RigidBody],
-        forces_from: Callable[[Context, RigidBody], Forces],
+        self, plant: MultibodyPlant, scene_graph: SceneGraph, bearers: Sequence[RigidBody]
     ) -> None:
         super().__init__()
         self._plant, self._scene_graph = plant, scene_graph
-        self._bearers, self._forces_from = tuple(bearers), forces_from
+        self._bearers = tuple(bearers)
+        joints = map(plant.get_joint, plant.GetJointIndices())
+        self._joints = {int(joint.child_body().index()): joint for joint in joints}
         self._index = self.DeclareAbstractState(Value[object](SleepMemory()))
         self.DeclareAbstractOutputPort(
             "loads", no_forces, self._calc_loads, {self.all_state_ticket()}
@@ -98,7 +94,7 @@ class Sleep(LeafSystem):
             loads = self._load_of(root, body)
             self._changed(root).loads[body.scoped_name().get_full()] = loads
             self._plant.SetFreeBodySpatialVelocity(context, body, SpatialVelocity.Zero())
-            body.Lock(context)
+            self._joints[int(body.index())].Lock(context)
             self._set_contact(root, body, apart_from, active=False)
 
     def wake(self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody] = ()) -> None:
@@ -107,7 +103,7 @@ class Sleep(LeafSystem):
         if body.is_locked(context):
             self._changed(root).loads.pop(body.scoped_name().get_full(), None)
             self._set_contact(root, body, apart_from, active=True)
-            body.Unlock(context)
+            self._joints[int(body.index())].Unlock(context)
 
     def _set_contact(
         self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody], *, active: bool
@@ -130,7 +126,7 @@ class Sleep(LeafSystem):
         memory, name = self.memory(root), body.scoped_name().get_full()
         if root.get_time() <= memory.restored_at:
             return memory.latest.get(name, [])
-        return [*self._contact_forces(root, body), *self._forces_from(root, body)]
+        return list(self._contact_forces(root, body))
 
     def _contact_forces(self, root: Context, body: RigidBody) -> Iterator[Any]:
         """Yield the contact forces of a body on the bearers."""

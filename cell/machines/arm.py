@@ -8,7 +8,7 @@ and its tool is taken to be compensated exactly, as the controllers of such arms
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -20,23 +20,17 @@ from pydrake.multibody.tree import (
     ModelInstanceIndex,
     RevoluteJoint,
 )
-from pydrake.systems.framework import Context, DiagramBuilder, InputPort, OutputPort
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from cell.configuration.config import ArmConfig
-from cell.machines.drive import ArmDrive
+from cell.errors import InputError
+from cell.machines.arms import ArmModel
+from cell.machines.drive import ArmDrive, NamedPorts
 from cell.machines.driver import Driver
 from cell.machines.gripper import Gripper
 from cell.machines.sensors import WrenchSensor
 from cell.paths import model_url, new_parser
 
-JOINTS = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
 # Joint friction that stays when the position drive is off [N m s/rad]; [A], below 1 % of a
 # UR5e wrist joint's torque at working speed.
 TORQUE_MODE_DAMPING = 0.3
@@ -56,7 +50,8 @@ class Arm:
         joints: From base to flange.
         actuators: In the order of ``joints``.
         wrist: Force-torque sensor between flange and tool.
-        config: Gains and home configuration.
+        config: Where it stands, gains and home configuration.
+        model: Its type: kinematics, limits.
         drive: What the joints are told.
     """
 
@@ -68,12 +63,18 @@ class Arm:
     actuators: tuple[JointActuator, ...]
     wrist: WrenchSensor
     config: ArmConfig
+    model: ArmModel
     drive: ArmDrive
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return self.model.dof
 
     @property
     def home(self) -> np.ndarray:
         """Home configuration (n,) [rad]."""
-        return np.deg2rad(self.config.home_deg)
+        return home_of(self.model, self.config, self.tool.role)
 
     @property
     def effort_limits(self) -> np.ndarray:
@@ -104,74 +105,120 @@ class Arm:
             plant_context, JacobianWrtVariable.kV, frame, p_FoC, world, world
         )
         start = self.joints[0].velocity_start()
-        return jacobian[:, start : start + len(self.joints)]
+        return jacobian[:, start : start + self.dof]
 
-    def connect(self, builder: DiagramBuilder) -> tuple[dict[str, InputPort], dict[str, OutputPort]]:
-        """Connect arm, tool and wrist sensor to the finalized plant; return ports by full name."""
+    def connect(self, builder: DiagramBuilder, prefix: str) -> NamedPorts:
+        """Connect arm, tool and wrist sensor to the finalized plant.
+
+        Args:
+            builder: Holds the drives already.
+            prefix: Of the names of systems in the diagram.
+
+        Returns:
+            Inputs and outputs by name: "left.torque", "left_gripper.opening" ...
+        """
         self.drive.connect(builder, self.plant, self.instance)
-        self.wrist.connect(builder)
-        inputs, outputs = self.tool.connect(builder)
+        wrench = self.wrist.connect(builder, f"{prefix}{self.name}_wrist")
+        inputs, outputs = self.tool.connect(builder, prefix)
         inputs = {f"{self.tool.name}.{name}": port for name, port in inputs.items()}
         outputs = {f"{self.tool.name}.{name}": port for name, port in outputs.items()}
         for name in ("desired_state", "torque"):
             inputs[f"{self.name}.{name}"] = self.drive.GetInputPort(name)
-        return inputs, outputs | {f"{self.name}.wrench": self.wrist.get_output_port()}
+        return inputs, outputs | {f"{self.name}.wrench": wrench}
 
     def hold_here(self, root: Context) -> None:
         """Switch to the position drive, with the target where the arm is."""
-        n = len(self.joints)
+        n = self.dof
         self.drive.use_torque(root, False)
         self.drive.set_effort(root, np.zeros(n))
         q = self.positions(self.plant.GetMyContextFromRoot(root))
         self.drive.set_target(root, q, np.zeros(n))
 
 
-def arm_drive(config: ArmConfig, time_step: float) -> ArmDrive:
+def home_of(model: ArmModel, config: ArmConfig, role: str) -> np.ndarray:
+    """Return the joint angles (n,) in which an arm with a tool of a role waits [rad]."""
+    own = (config.home_pan_deg, *model.home_deg[role][1:])
+    return np.deg2rad(_per_joint(model, "home_deg", config.home_deg, own))
+
+
+def _per_joint(
+    model: ArmModel, key: str, given: Sequence[float], own: Sequence[float]
+) -> Sequence[float]:
+    """Return what the configuration gives per joint, or else the model's own.
+
+    Raises:
+        InputError: Another number of joints.
+    """
+    if given and len(given) != model.dof:
+        raise InputError(
+            f"'{key}' of an arm has {len(given)} numbers; arm model '{model.name}' has "
+            f"{model.dof} joints. Leave it empty for the model's own."
+        )
+    return given or own
+
+
+def arm_drive(model: ArmModel, config: ArmConfig, role: str, time_step: float) -> ArmDrive:
     """Return the drive of an arm, which goes into the diagram before the plant.
 
     Args:
+        model: Type of the arm.
         config: Of the arm.
+        role: Of its tool: "gripper" or "driver".
         time_step: Of the plant [s].
     """
-    gains = list(zip(config.stiffness, config.damping, strict=True))
-    return ArmDrive(np.deg2rad(config.home_deg), gains, TORQUE_MODE_DAMPING, time_step)
+    stiffness = _per_joint(model, "stiffness", config.stiffness, model.stiffness)
+    damping = _per_joint(model, "damping", config.damping, model.damping)
+    gains = list(zip(stiffness, damping, strict=True))
+    return ArmDrive(home_of(model, config, role), gains, TORQUE_MODE_DAMPING, time_step)
 
 
 def add_arm(
     plant: MultibodyPlant,
     name: str,
+    model: ArmModel,
     config: ArmConfig,
     drive: ArmDrive,
     tool_model: str,
-    add_tool: Callable[[MultibodyPlant, ModelInstanceIndex], Tool],
+    add_tool: Callable[[ModelInstanceIndex], Tool],
 ) -> Arm:
     """Add an arm with a tool to the plant, before it is finalized.
 
     Args:
         plant: Not finalized yet.
         name: For example "left"; the instances become ``<name>_arm`` and ``<name>_tool``.
+        model: Type of the arm.
         config: Pose of the base, gains and home configuration.
         drive: From `arm_drive`.
         tool_model: Name of the SDF model of the tool; its frame ``mount`` meets the flange.
         add_tool: Makes the handle of the tool from its model instance.
     """
     parser = new_parser(plant)
-    (instance,) = parser.AddModelsFromUrl(model_url("ur5e"))
+    (instance,) = parser.AddModelsFromUrl(model_url(model.sdf))
     (tool,) = parser.AddModelsFromUrl(model_url(tool_model))
     plant.RenameModelInstance(instance, f"{name}_arm")
     plant.RenameModelInstance(tool, f"{name}_tool")
-    base = plant.GetFrameByName("base_link", instance)
+    base = plant.GetFrameByName(model.base_frame, instance)
     plant.WeldFrames(plant.world_frame(), base, config.X_WB)
     wrist = plant.WeldFrames(
-        plant.GetFrameByName("flange", instance), plant.GetFrameByName("mount", tool)
+        plant.GetFrameByName(model.flange_frame, instance), plant.GetFrameByName("mount", tool)
     )
     plant.set_gravity_enabled(instance, False)
     plant.set_gravity_enabled(tool, False)
-    joints = tuple(plant.GetJointByName(joint, instance) for joint in JOINTS)
-    actuators = tuple(plant.GetJointActuatorByName(joint, instance) for joint in JOINTS)
+    joints = tuple(plant.GetJointByName(joint, instance) for joint in model.joints)
+    actuators = tuple(plant.GetJointActuatorByName(joint, instance) for joint in model.joints)
     drive.drive(actuators)
-    handle = add_tool(plant, tool)
-    arm = Arm(name, plant, instance, handle, joints, actuators, WrenchSensor(plant, wrist), config, drive)
+    arm = Arm(
+        name=name,
+        plant=plant,
+        instance=instance,
+        tool=add_tool(tool),
+        joints=joints,
+        actuators=actuators,
+        wrist=WrenchSensor(plant, wrist),
+        config=config,
+        model=model,
+        drive=drive,
+    )
     for joint, angle in zip(joints, arm.home, strict=True):
         joint.set_default_angle(angle)
     return arm

@@ -11,12 +11,10 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiagramBuilder,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
-from cell.machines.drive import JointDrive
+from cell.machines.drive import JointDrive, NamedPorts
 
 # Speed loop of the spindle: at the seating speed of 7 rad/s it stalls at 0.7 N m, so that the bolt
 # still turns when the clutch trips at 0.5 N m and friction is fully mobilised [A].
@@ -115,10 +113,10 @@ class Driver:
         float_z = plant.GetJointByName("float_z_joint", instance)
         return Driver(name, plant, instance, spindle, float_z, drive)
 
-    def connect(self, builder: DiagramBuilder) -> tuple[dict[str, InputPort], dict[str, OutputPort]]:
+    def connect(self, builder: DiagramBuilder, prefix: str) -> NamedPorts:
         """Connect to the finalized plant; return inputs and outputs by name."""
         self.drive.connect(builder, self.plant, self.instance)
-        sensor = builder.AddNamedSystem(f"{self.name}_sensor", DriverSensor(self))
+        sensor = builder.AddNamedSystem(f"{prefix}{self.name}_sensor", DriverSensor(self))
         builder.Connect(self.plant.get_state_output_port(), sensor.GetInputPort("state"))
         actuation = self.plant.get_net_actuation_output_port(self.instance)
         builder.Connect(actuation, sensor.GetInputPort("actuation"))

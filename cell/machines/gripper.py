@@ -11,23 +11,15 @@ from pydrake.systems.framework import (
     BasicVector,
     Context,
     DiagramBuilder,
-    InputPort,
     LeafSystem,
-    OutputPort,
 )
 
-from cell.machines.drive import JointDrive
+from cell.machines.drive import JointDrive, NamedPorts
+from cell.machines.grippers import GripperModel
 
 FINGER_JOINTS = ("finger_left_joint", "finger_right_joint")
-# Position loop of the jaw: stiff against the grip force, soft against a width error: 0.5 mm of it
-# changes the force by 2.5 N [A].
-JAW_STIFFNESS = 2e4
-JAW_DAMPING = 200.0
 # The jaws wait this far open [m]: wide enough for the motor, narrow enough to see that they move.
 JAW_REST = 0.045
-
-# The wide jaws stand back behind the tip pads, on both sides together [m] (see cell/cad/hand_e.py).
-JAW_SETBACK = {"tip": 0.0, "nose": 0.0, "wide": 0.024}
 
 
 @dataclass(frozen=True)
@@ -49,8 +41,9 @@ class GripperDrive(JointDrive):
     Input ports, optional: ``opening`` [m] of the tip pads, ``force`` [N] per pad.
     """
 
-    def __init__(self) -> None:
-        super().__init__(finger_target(JAW_REST, 0.0))
+    def __init__(self, model: GripperModel) -> None:
+        super().__init__(np.array([JAW_REST / 2]))
+        self._model = model
         self._opening_in = self.DeclareVectorInputPort("opening", 1)
         self._force_in = self.DeclareVectorInputPort("force", 1)
 
@@ -59,15 +52,14 @@ class GripperDrive(JointDrive):
         if not self._opening_in.HasValue(context):
             return super().desired(context)
         force = self._force_in.Eval(context)[0] if self._force_in.HasValue(context) else 0.0
-        return np.append(finger_target(float(self._opening_in.Eval(context)[0]), force), 0.0)
+        return np.append(self.finger_target(float(self._opening_in.Eval(context)[0]), force), 0.0)
 
+    def finger_target(self, opening: float, force: float) -> np.ndarray:
+        """Return the target (1,) of the driven finger for an opening [m] and a force per pad [N].
 
-def finger_target(opening: float, force: float) -> np.ndarray:
-    """Return the target (1,) of the driven finger [m].
-
-    The drive's force is shared by two fingers, hence the factor 2.
-    """
-    return np.array([opening / 2 - 2 * force / JAW_STIFFNESS])
+        The drive's force is shared by two fingers, hence the factor 2.
+        """
+        return np.array([opening / 2 - 2 * force / self._model.stiffness])
 
 
 class OpeningSensor(LeafSystem):
@@ -89,6 +81,7 @@ class Gripper:
 
     Attributes:
         name: Of the device, for example "left_gripper".
+        model: Its type: stroke, jaws.
         plant: The plant it lives in.
         instance: Its model instance.
         finger: The driven joint.
@@ -98,6 +91,7 @@ class Gripper:
     role = "gripper"
 
     name: str
+    model: GripperModel
     plant: MultibodyPlant
     instance: ModelInstanceIndex
     finger: Joint
@@ -105,27 +99,33 @@ class Gripper:
 
     @staticmethod
     def add(
-        plant: MultibodyPlant, instance: ModelInstanceIndex, name: str, drive: GripperDrive
+        plant: MultibodyPlant,
+        instance: ModelInstanceIndex,
+        name: str,
+        model: GripperModel,
+        drive: GripperDrive,
     ) -> Gripper:
         """Give the jaws of a model their drive, before the plant is finalized."""
         left, right = (plant.GetJointByName(joint, instance) for joint in FINGER_JOINTS)
         actuator = plant.GetJointActuatorByName(FINGER_JOINTS[0], instance)
-        actuator.set_controller_gains(PdControllerGains(p=JAW_STIFFNESS, d=JAW_DAMPING))
+        actuator.set_controller_gains(PdControllerGains(p=model.stiffness, d=model.damping))
         for joint in (left, right):
             joint.set_default_translation(JAW_REST / 2)
-        return Gripper(name, plant, instance, left, drive)
+        return Gripper(name, model, plant, instance, left, drive)
 
-    def connect(self, builder: DiagramBuilder) -> tuple[dict[str, InputPort], dict[str, OutputPort]]:
+    def connect(self, builder: DiagramBuilder, prefix: str) -> NamedPorts:
         """Connect to the finalized plant; return inputs and outputs by name."""
         self.drive.connect(builder, self.plant, self.instance)
-        sensor = builder.AddNamedSystem(f"{self.name}_sensor", OpeningSensor(self.plant, self.finger))
+        sensor = builder.AddNamedSystem(
+            f"{prefix}{self.name}_sensor", OpeningSensor(self.plant, self.finger)
+        )
         builder.Connect(self.plant.get_state_output_port(), sensor.get_input_port())
         inputs = {name: self.drive.GetInputPort(name) for name in ("opening", "force")}
         return inputs, {"opening": sensor.get_output_port()}
 
     def command(self, root: Context, opening: float, force: float) -> None:
         """Aim at an opening of the tip pads [m]; press with ``force`` per pad [N] there."""
-        self.drive.set_target(root, finger_target(opening, force), np.zeros(1))
+        self.drive.set_target(root, self.drive.finger_target(opening, force), np.zeros(1))
 
     def read(self, plant_context: Context) -> GripperReading:
         """Return opening and rate."""

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import WeldJoint
-from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem, OutputPort
 
 
 class WrenchSensor(LeafSystem):
@@ -34,10 +34,12 @@ class WrenchSensor(LeafSystem):
         self._poses_in = self.DeclareAbstractInputPort("body_poses", poses)
         self.DeclareVectorOutputPort("wrench", 6, self._calc)
 
-    def connect(self, builder: DiagramBuilder) -> None:
-        """Connect to the finalized plant."""
+    def connect(self, builder: DiagramBuilder, name: str) -> OutputPort:
+        """Add it to a diagram under a name, connected to the finalized plant; return its output."""
+        builder.AddNamedSystem(name, self)
         builder.Connect(self.plant.get_reaction_forces_output_port(), self._forces_in)
         builder.Connect(self.plant.get_body_poses_output_port(), self._poses_in)
+        return self.get_output_port()
 
     def _calc(self, context: Context, output: BasicVector) -> None:
         X_WB = self._poses_in.Eval(context)[self._body]

@@ -83,9 +83,7 @@ class Parts:
             (self.wake if name in names else self.sleep)(root, name)
 
 
-def add_parts(
-    plant: MultibodyPlant, product: Product, X_WT: RigidTransform
-) -> Parts:
+def add_parts(plant: MultibodyPlant, product: Product, X_WT: RigidTransform) -> Parts:
     """Add every part that has a model, at its pose in the tray T.
 
     Args:

@@ -20,9 +20,16 @@ from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
+from pydrake.geometry import (
+    CollisionFilterDeclaration,
+    GeometryId,
+    GeometrySet,
+    ProximityProperties,
+    RoleAssign,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     Frame,
@@ -34,7 +41,8 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from cell.products.product import Fastener
+from cell.errors import BadPart
+from cell.products.joints import Screw, head_friction
 
 # Ball constraints must sit at about the bolt's radius of gyration: there they are stiffest
 # (measured in Drake: 3.7e6 N/m at 3 mm against 4e5 at 10 mm for a 1.2 g bolt at 1 ms) [M].
@@ -150,12 +158,12 @@ class Thread:
     of the bit's end face.
     """
 
-    fastener: Fastener
+    screw: Screw
     plant: MultibodyPlant
     scene_graph: SceneGraph
     bolt: RigidBody
     follower: RigidBody
-    screw: ScrewJoint
+    joint: ScrewJoint
     thread_frame: Frame
     bit_frame: Frame
     thread_tie: tuple[MultibodyConstraintId, ...]
@@ -171,7 +179,7 @@ class Thread:
         A clamped bolt is pulled into the hole, along -z of the joint frame.
         """
         forces = self.plant.get_reaction_forces_output_port().Eval(plant_context)
-        return -float(forces[int(self.screw.index())].translational()[2])
+        return -float(forces[int(self.joint.index())].translational()[2])
 
     def bit_misfit(self, context: Context) -> tuple[Misfit, int]:
         """Return the error between bit and socket, for the nearest of the six hex positions."""
@@ -186,7 +194,7 @@ class Thread:
     def thread_misfit(self, context: Context) -> tuple[Misfit, float]:
         """Return the bolt's error against the helix, and the follower angle that fits best."""
         free = Misfit.between(self.X_HF(context))
-        pitch = self.fastener.pitch
+        pitch = self.screw.pitch
         turns = round((free.axial - pitch * free.angle / (2 * np.pi)) / pitch)
         theta = free.angle + 2 * np.pi * turns
         axial = free.axial - pitch * theta / (2 * np.pi)
@@ -202,7 +210,7 @@ class Thread:
             self.plant.SetConstraintActiveStatus(context, constraint, caught)
         self.set_bit(root, engagement.bit_position)
         turns = engagement.state is ThreadState.CAUGHT
-        (self.screw.Unlock if turns else self.screw.Lock)(context)
+        (self.joint.Unlock if turns else self.joint.Lock)(context)
 
     def set_bit(self, root: Context, position: int) -> None:
         """Tie the bit in one of its hex positions; `NO_BIT` opens all ties."""
@@ -215,7 +223,7 @@ class Thread:
         """Turn the follower, without load, to an angle [rad]."""
         context = self.plant.GetMyMutableContextFromRoot(root)
         q = self.plant.GetPositions(context).copy()
-        q[self.screw.position_start()] = theta
+        q[self.joint.position_start()] = theta
         self.plant.SetPositions(context, q)
 
     def _set_inertia(self, context: Context, *, engaged: bool) -> None:
@@ -252,27 +260,60 @@ def _tie_points(z: float) -> list[np.ndarray]:
     ]
 
 
+def set_head_friction(
+    plant: MultibodyPlant, scene_graph: SceneGraph, screw: Screw, bolt: RigidBody, clamps: RigidBody
+) -> None:
+    """Give a bolt's head the friction of its nut factor, before the plant is finalized.
+
+    The head is the geometry "head" of the bolt's model; what it bears on are the geometries
+    "washer..." of the clamped part, where there are such.
+
+    Raises:
+        BadPart: The bolt's model has no geometry "head".
+    """
+    inspector = scene_graph.model_inspector()
+
+    def named(body: RigidBody, prefix: str) -> list[GeometryId]:
+        ids = plant.GetCollisionGeometriesForBody(body)
+        return [i for i in ids if inspector.GetName(i).split("::")[-1].startswith(prefix)]
+
+    heads, washers = named(bolt, "head"), named(clamps, "washer")
+    if not heads:
+        raise BadPart(screw.part, "its model has no collision geometry 'head' for the bolt's head")
+    counter = None
+    if washers:
+        properties = inspector.GetProximityProperties(washers[0])
+        counter = properties.GetProperty("material", "coulomb_friction").static_friction()
+    friction = head_friction(screw, counter)
+    for head in heads:
+        properties = ProximityProperties(inspector.GetProximityProperties(head))
+        material = CoulombFriction(friction, friction)
+        properties.UpdateProperty("material", "coulomb_friction", material)
+        source = plant.get_source_id()
+        scene_graph.AssignRole(source, head, properties, RoleAssign.kReplace)
+
+
 def add_thread(
     plant: MultibodyPlant,
     scene_graph: SceneGraph,
-    fastener: Fastener,
+    screw: Screw,
     bolt: RigidBody,
     into: RigidBody,
     X_IH: RigidTransform,
     bit_frame: Frame,
 ) -> Thread:
-    """Add the follower and the (open) ties of one fastener, before the plant is finalized.
+    """Add the follower and the (open) ties of one screw, before the plant is finalized.
 
     Args:
         plant: Not finalized yet.
         scene_graph: Where collision filters are set.
-        fastener: Pitch and names.
+        screw: Pitch and names.
         bolt: The bolt; its z axis points from the shank to the head.
         into: The part that carries the thread.
         X_IH: Thread frame H in the frame of ``into``: the bolt's pose when seated.
         bit_frame: Frame E at the bit's end face, +z out of the tool.
     """
-    name = f"thread_{fastener.part}"
+    name = f"thread_{screw.part}"
     H = plant.AddFrame(FixedOffsetFrame(name, into.body_frame(), X_IH))
     unit = FOLLOWER_INERTIA / FOLLOWER_MASS
     follower = plant.AddRigidBody(
@@ -281,8 +322,8 @@ def add_thread(
         SpatialInertia(FOLLOWER_MASS, np.zeros(3), UnitInertia(unit, unit, unit)),
     )
     # Right-hand thread: a positive rotation about +z (out of the hole) moves out of the hole.
-    screw = plant.AddJoint(
-        ScrewJoint(name, H, follower.body_frame(), np.array([0.0, 0.0, 1.0]), fastener.pitch, 0.0)
+    joint = plant.AddJoint(
+        ScrewJoint(name, H, follower.body_frame(), np.array([0.0, 0.0, 1.0]), screw.pitch, 0.0)
     )
     thread_tie = tuple(
         plant.AddBallConstraint(follower, point, bolt, point) for point in _tie_points(0.0)
@@ -300,5 +341,5 @@ def add_thread(
         for position in range(HEX_POSITIONS)
     )
     return Thread(
-        fastener, plant, scene_graph, bolt, follower, screw, H, bit_frame, thread_tie, bit_ties
+        screw, plant, scene_graph, bolt, follower, joint, H, bit_frame, thread_tie, bit_ties
     )

@@ -11,10 +11,14 @@ from collections.abc import Iterator, Mapping
 from dataclasses import replace
 
 import numpy as np
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context, LeafSystem
 
 from cell.errors import UnknownName
 from cell.machines.driver import Driver
+from cell.products.product import Product
+from cell.workpieces.parts import Parts
 from cell.workpieces.thread import (
     BIT_GATE,
     NO_BIT,
@@ -23,6 +27,8 @@ from cell.workpieces.thread import (
     Engagement,
     Thread,
     ThreadState,
+    add_thread,
+    set_head_friction,
 )
 
 
@@ -31,10 +37,10 @@ class Threads(LeafSystem):
 
     Args:
         threads: By the name of the bolt.
-        driver: Whose bit drives them.
+        driver: Whose bit drives them; None: nothing does.
     """
 
-    def __init__(self, threads: Mapping[str, Thread], driver: Driver) -> None:
+    def __init__(self, threads: Mapping[str, Thread], driver: Driver | None) -> None:
         super().__init__()
         self._threads, self._driver = dict(threads), driver
         rows = [Engagement().row() for _ in threads]
@@ -91,6 +97,8 @@ class Threads(LeafSystem):
 
     def step(self, root: Context, dt: float) -> None:
         """Apply the rules, after a step of the plant."""
+        if self._driver is None or not self._threads:
+            return
         rows = self._rows(root)
         turning = self._driver.drive.commanded_speed(root) != 0.0
         busy = (rows[:, 0] == STATES.index(ThreadState.CAUGHT)) | (rows[:, 1] != NO_BIT)
@@ -109,14 +117,17 @@ class Threads(LeafSystem):
             if row.state is ThreadState.CAUGHT:
                 row = replace(row, state=ThreadState.LOCKED)
                 self.set(root, bolt, row)
-            if bolt in driven and self._driver.push(self._plant_context(root)) <= 0.0:
+            if (
+                bolt in driven
+                and self._driver.push(self._driver.plant.GetMyContextFromRoot(root)) <= 0.0
+            ):
                 self._threads[bolt].set_bit(root, NO_BIT)
                 self._remember(root, bolt, replace(row, bit_position=NO_BIT))
 
     def _engage(self, root: Context, now: Mapping[str, Engagement]) -> None:
         """Tie the bit to a bolt if it is inside its socket."""
-        context = self._plant_context(root)
         for bolt, thread in self._threads.items():
+            context = thread.plant.GetMyContextFromRoot(root)
             if thread.bolt.is_locked(context):
                 continue
             misfit, position = thread.bit_misfit(context)
@@ -128,14 +139,11 @@ class Threads(LeafSystem):
     def _catch(self, root: Context, bolt: str, row: Engagement) -> None:
         """Let the thread catch if the turning bolt meets the helix."""
         thread = self._threads[bolt]
-        misfit, theta = thread.thread_misfit(self._plant_context(root))
+        misfit, theta = thread.thread_misfit(thread.plant.GetMyContextFromRoot(root))
         if misfit.within(THREAD_GATE):
             thread.set_angle(root, theta)
             caught = Engagement(ThreadState.CAUGHT, row.bit_position, theta)
             self.set(root, bolt, caught)
-
-    def _plant_context(self, root: Context) -> Context:
-        return self._driver.plant.GetMyContextFromRoot(root)
 
     def _remember(self, root: Context, bolt: str, engagement: Engagement) -> None:
         rows = self._rows(root)
@@ -152,3 +160,32 @@ class Threads(LeafSystem):
         """Undo `save`; the positions are restored with the plant's."""
         for bolt, row in zip(self._threads, rows, strict=True):
             self.set(root, bolt, Engagement.of(row))
+
+
+def add_threads(
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    product: Product,
+    parts: Parts,
+    driver: Driver | None,
+) -> Threads:
+    """Add the tapped hole and the open ties of every screw of the product.
+
+    Args:
+        plant: Not finalized yet.
+        scene_graph: Where collision filters and the heads' friction are set.
+        product: Its screws.
+        parts: In the plant.
+        driver: Whose bit drives them; None if there is none: then no thread ever catches.
+    """
+    threads = {}
+    if driver is not None:
+        plant.AddModelInstance("threads")
+        for name, screw in product.screws.items():
+            bolt, into = parts[name].body, parts[screw.into].body
+            set_head_friction(plant, scene_graph, screw, bolt, parts[screw.clamps].body)
+            X_IH = product.parts[screw.into].X_AP.inverse() @ product.parts[name].X_AP
+            threads[name] = add_thread(
+                plant, scene_graph, screw, bolt, into, X_IH, driver.bit_frame
+            )
+    return Threads(threads, driver)

@@ -7,7 +7,6 @@ from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Protocol
-from zipfile import BadZipFile
 
 import numpy as np
 
@@ -212,10 +211,7 @@ def read_final_state(path: Path) -> State:
     Raises:
         InputError: It cannot be read, or is something else.
     """
-    try:
-        state = read_state(path)
-    except (OSError, ValueError, BadZipFile) as error:
-        raise InputError(f"Cannot read the saved state '{path}': {error}.") from error
+    state = read_state(path)
     if DONE not in state:
         raise InputError(f"'{path}' is not the state.npz that a run ends with.")
     return state

@@ -7,12 +7,12 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.cad.hand_e import STROKE as FINGER_STROKE
+from cell.machines.grippers import HAND_E
 from cell.products.product import Product
 from planning.feasibility.algorithm import Geometry
 from planning.fixture_analysis.footprint import footprint
 
-STROKE = 2.0 * FINGER_STROKE  # [m] Both fingers: 50 mm.
+STROKE = HAND_E.stroke  # [m]
 BELOW = "the hand would have to come from below, through the jig"
 WIDE = f"{{:.0f}} mm across, the gripper opens {1e3 * STROKE:.0f} mm"
 FROM_BELOW = 0.1  # Rise of an approach per length above which it comes from below, from the jig.
