@@ -6,7 +6,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.ndimage import uniform_filter1d
 
-from experiments.metrics.common import Measured, angle_between
+from planning.operations.measures import angle_between
+from planning.operations.record import Measured
 from experiments.paper.camera import seen_displacement
 from experiments.paper.trial import HOVER, Trial
 
