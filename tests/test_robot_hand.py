@@ -20,7 +20,7 @@ from planning.motion.kinematics import tool_pose
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import reachable_grasps
 from planning.operations.placement import YAWS, pose_on_jig
-from planning.operations.push import PushLine, can_push, push
+from planning.operations.push.phases import PushLine, can_push, push
 from planning.operations.stroke import Stroke
 
 STILL = Disturbance(RigidTransform(), np.zeros(2), seed=0)

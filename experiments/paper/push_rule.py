@@ -10,7 +10,7 @@ from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import AXES, MM, Push
 from experiments.paper.reach import Fingers
 from experiments.paper.rig.stage import Stage
-from planning.operations.push import PushLine
+from planning.operations.push.phases import PushLine
 from planning.operations.stroke import Stroke
 
 # Least horizontal part of a unit direction that a push can follow: the part lies 84 deg askew.

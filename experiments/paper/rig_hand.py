@@ -16,8 +16,8 @@ from experiments.paper.rig.rig_simulation import RigSimulation
 from experiments.paper.rig.stage import Observer
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
-from planning.operations.pick_place import DEEPEST, JAM_TIME, PRESS_SPEED
-from planning.operations.push import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
+from planning.operations.pick_place.phases import DEEPEST, JAM_TIME, PRESS_SPEED
+from planning.operations.push.phases import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
 
 HOLD_TIME = 0.2  # The hand stays this long after the bag has frozen [s] [A].
 RETREAT = 0.08

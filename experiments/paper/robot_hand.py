@@ -21,14 +21,14 @@ from cell.products.product import Product
 from cell.simulation.events import rest_jig, wake_jig
 from cell.simulation.phase import Outcome, Phase, PhaseFailed, after
 from cell.simulation.simulation import Simulation
-from experiments.metrics.common import angle_between
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer, Stage
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
-from planning.operations.pick_place import pick_place
+from planning.operations.measures import angle_between
+from planning.operations.pick_place.phases import pick_place
 from planning.operations.placement import YAWS, anywhere
-from planning.operations.push import PushLine, approach, can_push, push
+from planning.operations.push.phases import PushLine, approach, can_push, push
 from planning.operations.station import Station
 
 ON_JIG = "press"  # The first phase with the part on the jig.
