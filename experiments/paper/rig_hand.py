@@ -111,7 +111,7 @@ class RigHand:
         simulation.wait(READY_TIME)
         simulation.observer.tare()
         simulation.observer.recording = True
-        simulation.jaws(tip_opening(self.grasp), self.grasp.force)
+        simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp), self.grasp.force)
         simulation.wait(GRIP_TIME)
         simulation.rig.let_part_go(simulation.root)
         simulation.wait(0.1)
@@ -120,7 +120,7 @@ class RigHand:
         """Open the jaws and back off along the approach direction."""
         simulation = self.simulation
         simulation.begin("release")
-        simulation.jaws(tip_opening(self.grasp) + CLEARANCE)
+        simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp) + CLEARANCE)
         simulation.wait(RELEASE_TIME)
         start = simulation.pose
         for distance, speed in ((CLEAR, 0.08), (RETREAT, TRAVEL_SPEED)):
