@@ -55,9 +55,10 @@ def test_imprint_is_the_parts_surface(held) -> None:
     rig, *_ = held
     samples = SurfaceSamples.of("surface", rig.part.mesh(), spacing=0.0005)
     surface = (rig.X_JP @ samples.points.T).T
-    bed = rig.jig.memory(rig.root).bed
-    touching = np.isfinite(bed.underside_over_bed("part"))
-    touching &= bed.underside_over_bed("part") < bed.heights + 1e-4
+    memory = rig.jig.memory(rig.root)
+    bed, (name,) = memory.bed, memory.pressing
+    touching = np.isfinite(bed.underside_over_bed(name))
+    touching &= bed.underside_over_bed(name) < bed.heights + 1e-4
     touched = np.column_stack([bed.x[touching], bed.y[touching], bed.heights[touching]])
     assert len(touched) * bed.bag.cell**2 > 1e-4
     distance, _ = KDTree(surface).query(touched)
