@@ -1,4 +1,4 @@
-"""Plots for the report, each from plain arrays to a PNG."""
+"""Plots for the report: plain arrays in, PNG out."""
 
 from __future__ import annotations
 
@@ -18,9 +18,9 @@ def plot_insertion_force(depth: np.ndarray, force: np.ndarray, limit: float | No
     """Plot the force of an insertion over its depth.
 
     Args:
-        depth: (n,) how far the part is in [m].
+        depth: (n,) insertion depth of the part [m].
         force: (n, 3) force on the part in W [N].
-        limit: The downward force at which the arm yields [N].
+        limit: The downward force at which the arm stops pushing [N].
     """
     figure, axes = _axes("depth [mm]", "force [N]")
     lateral = np.hypot(force[:, 0], force[:, 1])
@@ -37,7 +37,7 @@ def plot_torque(
     """Plot the tightening torque over the angle, one curve per bolt.
 
     Args:
-        angle: Bolt name -> (n,) angle since the thread caught [rad].
+        angle: Bolt name -> (n,) angle since the thread engaged [rad].
         torque: Bolt name -> (n,) torque [N m].
         target: Tightening torque to reach [N m].
     """
@@ -52,12 +52,12 @@ def plot_torque(
 def plot_force_plate(
     time: np.ndarray, force: np.ndarray, phases: Sequence[tuple[str, float]] = ()
 ) -> bytes:
-    """Plot what the force plate under the jig feels.
+    """Plot the force on the force plate under the jig.
 
     Args:
         time: (n,) [s].
         force: (n, 3) force on the plate in W [N].
-        phases: Name and start [s] of what happens, drawn as labelled lines.
+        phases: Name and start [s] of each phase, drawn as labelled lines.
     """
     figure, axes = _axes("time [s]", "force [N]")
     axes.plot(time, np.abs(force[:, 2]), label="normal")
