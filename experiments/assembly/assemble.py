@@ -48,7 +48,7 @@ def run_job(job: Job) -> int:
     """Plan, run, measure and report; return 0 if everything succeeded, else 1."""
     console = Console(quiet=job.quiet, highlight=False)
     check_models(job.product)
-    fixing = plan(job.product, job.order)
+    fixing = plan(job.product, job.order, config=job.config)
     try:
         todo = _operations(job, fixing)
     except NoOperation as reason:

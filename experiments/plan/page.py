@@ -1,4 +1,4 @@
-"""``plan.html``: the whole plan on one page that works offline."""
+"""``plan.html``: the whole plan on one self-contained page."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import opposite
 from planning.feasibility.evidence import evidence_text
-from planning.feasibility.order import together
-from planning.fixture_analysis.candidate import CRITERIA, Candidate, Choice, Setup
+from planning.feasibility.order import subassembly_name
+from planning.fixture_analysis.candidate import CRITERIA, Candidate, Choice, FixtureSetup
 from planning.fixture_analysis.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
-from planning.ordering.explain import advice_text, arrow_text
+from planning.ordering.advice_format import advice_text, constraint_text
 
 MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
 MOST_BLOCKERS = 400
@@ -35,30 +35,31 @@ def write_page(
     product: Product,
     plan: FixingPlan,
     choices: Sequence[Choice],
-    setup: Setup,
+    setup: FixtureSetup,
     notes: Sequence[str] = (),
 ) -> float:
-    """Write the page; return the time it took [s].
+    """Write the page; return the time taken [s].
 
     Args:
         path: The HTML file; it appears whole or not at all.
         product: What was planned.
         plan: Its plan.
-        choices: What the general rule says, per step.
-        setup: The cell.
-        notes: What the reader has to know besides.
+        choices: The general rule's ranking, per step.
+        setup: The cell's jig.
+        notes: Further remarks for the reader.
     """
     started = time.perf_counter()
     problem = rendering_problem()
+    evidence = evidence_text(plan.evidence) if plan.evidence else ""
     missing = [f"No pictures: {problem}."] if problem else []
     sections = [
         _summary(plan, [*notes, *missing]),
         section("Orders", _orders(plan.orders)),
         section("Steps", _steps(product, plan, choices, setup, pictured=problem is None)),
-        section("Exploded view", "" if problem else _exploded(product, plan)),
+        section("Exploded view", _exploded(product, plan) if problem is None else ""),
         section("Matrices", _matrices(plan)),
-        section("What the matrices rest on", _evidence(plan)),
-        section("What blocks what", _blockers(plan)),
+        section("Evidence", f"<pre>{escape(evidence)}</pre>" if evidence else ""),
+        section("Blocked motions", _blockers(plan)),
     ]
     body = "\n".join(filter(None, sections))
     write_text(path, page(f"{plan.product}: plan", body))
@@ -89,13 +90,17 @@ def _orders(advice: OrderAdvice | None) -> str:
     if not advice.ranked:
         return text
     first = escape(advice.ranked[0].order[0])
-    arrows = "".join(f"<li>{escape(arrow_text(arrow))}</li>" for arrow in advice.precedence)
-    listed = f"<ul>{arrows}</ul>" if arrows else "<p>None.</p>"
+    lines = "".join(f"<li>{escape(constraint_text(one))}</li>" for one in advice.precedence)
+    listed = f"<ul>{lines}</ul>" if lines else "<p>None.</p>"
     return f"{text}<h3>Precedence, in every order that begins with {first}</h3>{listed}"
 
 
 def _steps(
-    product: Product, plan: FixingPlan, choices: Sequence[Choice], setup: Setup, pictured: bool
+    product: Product,
+    plan: FixingPlan,
+    choices: Sequence[Choice],
+    setup: FixtureSetup,
+    pictured: bool,
 ) -> str:
     scores = f"<details><summary>What the scores mean</summary>{pairs(CRITERIA)}</details>"
     parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
@@ -116,22 +121,22 @@ def _steps(
 
 
 def _picture(
-    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: Setup
+    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: FixtureSetup
 ) -> str:
     step = plan.steps[number]
     figured = choice.candidates[choice.paper].figures if choice else {}
     depth = figured.get("depth_m", USUAL_DEPTH)
     shown = step_arrangement(product, step, setup.jig.bag, depth)
-    sides = [step.item, together(plan.order[: number + 1])]
+    sides = [step.item, subassembly_name(plan.order[: number + 1])]
     moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
     return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
 
 
 def _exploded(product: Product, plan: FixingPlan) -> str:
-    return (
-        _figure(exploded(product, plan.steps), "Each item moved out the way it comes in")
-        if plan.steps
-        else ""
+    if not plan.steps:
+        return ""
+    return _figure(
+        exploded(product, plan.steps), "Each item moved out against its mating direction"
     )
 
 
@@ -169,7 +174,7 @@ def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]
         "from": candidate.approach.removeprefix("the "),
         "score": f"{candidate.score:.2f}",
         **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
-        "bears / pushed across [N]": (
+        "withstands / operation sideways [N]": (
             f"{candidate.figures['bears_across_N']:.1f} / "
             f"{candidate.figures['pushed_across_N']:.1f}"
         ),
@@ -189,15 +194,11 @@ def _matrices(plan: FixingPlan) -> str:
                 direction_maps(plan.parts, plan.free, "M"),
             ),
             (
-                "W: blue where they touch as well, so that the row's part can be mated that way",
+                "W: blue where they also touch, so that the row's part can be mated along it",
                 direction_maps(plan.parts, plan.reachable, "W"),
             ),
         ]
     )
-
-
-def _evidence(plan: FixingPlan) -> str:
-    return f"<pre>{escape(evidence_text(plan.evidence))}</pre>" if plan.evidence else ""
 
 
 def _blockers(plan: FixingPlan) -> str:
