@@ -9,7 +9,7 @@ import trimesh
 
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.product import Product
-from experiments.plan.scene import Color, Shown
+from experiments.plan.scene import Color, SceneItem
 from planning.feasibility.algorithm import FixingStep
 from planning.feasibility.directions import opposite, rotation_with_up, unit_vector
 
@@ -31,7 +31,7 @@ GAP = 0.35  # Of the size of the moved parts, between the parts in a picture.
 
 def step_arrangement(
     product: Product, step: FixingStep, bag: BagParameters, depth: float
-) -> list[Shown]:
+) -> list[SceneItem]:
     """Return the product in its posture on the jig, and the moved parts with the mating arrow.
 
     Args:
@@ -54,23 +54,26 @@ def step_arrangement(
     start = _separation([turned[n] for n in moved], [turned[n] for n in below], leaving)
     for name in moved:
         turned[name].apply_translation(start * leaving)
-    shown = [Shown(bag_mesh(bag), BAG, frame=False), Shown(base_mesh(bag), BASE, frame=False)]
+    shown = [
+        SceneItem(bag_mesh(bag), BAG, frame=False),
+        SceneItem(base_mesh(bag), BASE, frame=False),
+    ]
     shown += _parts(product, turned, moved)
-    return [*shown, Shown(arrow([turned[n] for n in moved], -leaving), ARROW)]
+    return [*shown, SceneItem(arrow([turned[n] for n in moved], -leaving), ARROW)]
 
 
-def exploded(product: Product, steps: Sequence[FixingStep]) -> list[Shown]:
+def exploded(product: Product, steps: Sequence[FixingStep]) -> list[SceneItem]:
     """Return an exploded view: each item moved out against its mating direction."""
-    there = list(steps[0].target)
-    names = [*there, *(name for step in steps for name in step.incoming)]
+    assembled = list(steps[0].target)
+    names = [*assembled, *(name for step in steps for name in step.incoming)]
     turned = {name: _turned(product, name, steps[0].up) for name in names}
     for step in steps:
         leaving = rotation_with_up(step.up) @ unit_vector(step.posture)
         moved = [turned[name] for name in step.incoming]
-        distance = _separation(moved, [turned[name] for name in there], leaving)
+        distance = _separation(moved, [turned[name] for name in assembled], leaving)
         for mesh in moved:
             mesh.apply_translation(distance * leaving)
-        there += step.incoming
+        assembled += step.incoming
     return _parts(product, turned, ())
 
 
@@ -101,7 +104,7 @@ def _box(meshes: Sequence[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
 
 def _parts(
     product: Product, turned: dict[str, trimesh.Trimesh], moved: Sequence[str]
-) -> list[Shown]:
+) -> list[SceneItem]:
     """Return parts in one colour per item; the first part of a group has the group's label."""
     labels = {name: name for name in turned}
     for group, members in product.groups.items():
@@ -111,7 +114,7 @@ def _parts(
     labels |= dict.fromkeys(labelled[MOST_LABELS:], "")
     place = {n: k for k, item in enumerate(product.items()) for n in product.members(item)}
     return [
-        Shown(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
+        SceneItem(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
         for name, mesh in turned.items()
     ]
 

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from cell.products.product import Product
 from experiments.plan.arrangement import exploded, step_arrangement
 from experiments.plan.heatmaps import contact_map, direction_maps
-from experiments.plan.scene import Shown, figure, picture
+from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import figures, page, pairs, section, table
 from experiments.reporting.output import write_text
 from experiments.reporting.render import rendering_problem
@@ -21,7 +20,7 @@ from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import opposite
 from planning.feasibility.evidence import evidence_text
 from planning.feasibility.order import subassembly_name
-from planning.fixture_analysis.candidate import CRITERIA, Candidate, Choice, FixtureSetup
+from planning.fixture_analysis.candidate import CRITERIA, Choice, FixtureSetup
 from planning.fixture_analysis.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.advice_format import advice_text, constraint_text
@@ -51,12 +50,16 @@ def write_page(
     started = time.perf_counter()
     problem = rendering_problem()
     evidence = evidence_text(plan.evidence) if plan.evidence else ""
+    apart = ""
+    if plan.steps and problem is None:
+        shown = exploded(product, plan.steps)
+        apart = _figure(shown, "Each item moved out against its mating direction")
     missing = [f"No pictures: {problem}."] if problem else []
     sections = [
         _summary(plan, [*notes, *missing]),
         section("Orders", _orders(plan.orders)),
         section("Steps", _steps(product, plan, choices, setup, pictured=problem is None)),
-        section("Exploded view", _exploded(product, plan) if problem is None else ""),
+        section("Exploded view", apart),
         section("Matrices", _matrices(plan)),
         section("Evidence", f"<pre>{escape(evidence)}</pre>" if evidence else ""),
         section("Blocked motions", _blockers(plan)),
@@ -132,71 +135,58 @@ def _picture(
     return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
 
 
-def _exploded(product: Product, plan: FixingPlan) -> str:
-    if not plan.steps:
-        return ""
-    return _figure(
-        exploded(product, plan.steps), "Each item moved out against its mating direction"
-    )
-
-
-def _figure(shown: Sequence[Shown], caption: str) -> str:
+def _figure(shown: Sequence[SceneItem], caption: str) -> str:
     png, view = picture(shown)
     return figure(png, view, shown, caption)
 
 
 def _choice(choice: Choice) -> str:
-    passed = [_row(number, c, choice) for number, c in enumerate(choice.candidates, start=1)
-              if not c.rejected]  # fmt: skip
-    rejected = [c for c in choice.candidates if c.rejected]
-    notes = [(c, note) for c in choice.candidates for note in c.notes]
+    """Return the general rule's ranking: a table of the scores, notes, and the rejected ones."""
+    rows: list[dict[str, str]] = []
+    notes, rejected = [], []
+    for number, candidate in enumerate(choice.candidates):
+        mark = " (Algorithm 1)" if number == choice.paper else ""
+        notes += [(candidate.label + mark, note) for note in candidate.notes]
+        if candidate.rejected:
+            rejected.append((candidate.label + mark, candidate.rejected))
+            continue
+        figures = candidate.figures
+        rows.append(
+            {
+                "": f"{number + 1}",
+                "on the jig": candidate.name + mark,
+                "up": candidate.up,
+                "from": candidate.approach.removeprefix("the "),
+                "score": f"{candidate.score:.2f}",
+                **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
+                "withstands / operation sideways [N]": (
+                    f"{figures['bears_across_N']:.1f} / {figures['pushed_across_N']:.1f}"
+                ),
+            }
+        )
     kind = "agree" if choice.agrees else "differ"
     return (
         f'<p class="{kind}"><b>General rule:</b> {escape(choice.verdict)}</p>'
-        f"{table(passed, list(passed[0])) if passed else ''}"
-        f"{_about(choice, notes)}<details><summary>{len(rejected)} rejected</summary>"
-        f"{_about(choice, [(c, c.rejected) for c in rejected])}</details>"
+        f"{table(rows, list(rows[0])) if rows else ''}"
+        f"{_listed(notes)}<details><summary>{len(rejected)} rejected</summary>"
+        f"{_listed(rejected)}</details>"
     )
 
 
-def _about(choice: Choice, remarks: Sequence[tuple[Candidate, str]]) -> str:
-    lines = "".join(
-        f"<li>{escape(c.label + _by_paper(choice, c))}: {escape(text)}</li>" for c, text in remarks
-    )
+def _listed(remarks: Sequence[tuple[str, str]]) -> str:
+    lines = "".join(f"<li>{escape(what)}: {escape(text)}</li>" for what, text in remarks)
     return f"<ul>{lines}</ul>" if lines else ""
 
 
-def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]:
-    return {
-        "": number,
-        "on the jig": candidate.name + _by_paper(choice, candidate),
-        "up": candidate.up,
-        "from": candidate.approach.removeprefix("the "),
-        "score": f"{candidate.score:.2f}",
-        **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
-        "withstands / operation sideways [N]": (
-            f"{candidate.figures['bears_across_N']:.1f} / "
-            f"{candidate.figures['pushed_across_N']:.1f}"
-        ),
-    }
-
-
-def _by_paper(choice: Choice, candidate: Candidate) -> str:
-    return " (Algorithm 1)" if candidate is choice.candidates[choice.paper] else ""
-
-
 def _matrices(plan: FixingPlan) -> str:
+    contact = contact_map(plan.parts, plan.contact)
+    free = direction_maps(plan.parts, plan.free, "M")
+    reachable = direction_maps(plan.parts, plan.reachable, "W")
     return figures(
         [
-            ("C: blue where two parts touch", contact_map(plan.parts, plan.contact)),
-            (
-                "M: blue where the row's part leaves the column's part along the direction",
-                direction_maps(plan.parts, plan.free, "M"),
-            ),
-            (
-                "W: blue where they also touch, so that the row's part can be mated along it",
-                direction_maps(plan.parts, plan.reachable, "W"),
-            ),
+            ("C: blue where two parts touch", contact),
+            ("M: blue where the row's part leaves the column's part along the direction", free),
+            ("W: blue where they also touch: the row's part can be mated along it", reachable),
         ]
     )
 

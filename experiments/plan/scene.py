@@ -33,7 +33,7 @@ Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class SceneItem:
     """One mesh in a picture.
 
     Attributes:
@@ -49,7 +49,7 @@ class Shown:
     frame: bool = True
 
 
-def picture(shown: Sequence[Shown]) -> tuple[bytes, View]:
+def picture(shown: Sequence[SceneItem]) -> tuple[bytes, View]:
     """Return a PNG of meshes, and the camera it was taken with.
 
     Raises:
@@ -66,7 +66,7 @@ def picture(shown: Sequence[Shown]) -> tuple[bytes, View]:
     return take_picture(scene_graph, context, view, shadows=False), view
 
 
-def _geometry(item: Shown, number: int) -> GeometryInstance:
+def _geometry(item: SceneItem, number: int) -> GeometryInstance:
     file = MemoryFile(obj_text(item.mesh, normals=True), ".obj", f"part {number}")
     geometry = GeometryInstance(
         RigidTransform(), Mesh(InMemoryMesh(mesh_file=file)), f"part {number}"
@@ -93,7 +93,7 @@ def view_of(meshes: Iterable[trimesh.Trimesh]) -> View:
     )
 
 
-def figure(png: bytes, view: View, shown: Sequence[Shown], caption: str) -> str:
+def figure(png: bytes, view: View, shown: Sequence[SceneItem], caption: str) -> str:
     """Return a picture with its labels as HTML; the labels are SVG text, legible at every size."""
     labels = _labels(view, [item for item in shown if item.name])
     image = (
@@ -107,7 +107,7 @@ def figure(png: bytes, view: View, shown: Sequence[Shown], caption: str) -> str:
     )
 
 
-def _labels(view: View, named: Sequence[Shown]) -> str:
+def _labels(view: View, named: Sequence[SceneItem]) -> str:
     """Return the names in a column at the right edge, with a line to each part."""
     at = [projected(view, item.mesh.bounds.mean(axis=0)) for item in named]
     order = sorted(range(len(named)), key=lambda k: at[k][1])

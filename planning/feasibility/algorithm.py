@@ -12,7 +12,7 @@ Fixed part: with j along ``up``, the incoming part comes from above; the target 
 keeps its fixed part. With j against ``up``, the incoming part is at the bottom and becomes the
 fixed part. With j across ``up``, nothing is added below the target, and its fixed part stays.
 
-Several directions: the posture is the j for which the combined center of gravity (CoG), with j
+Several directions: the posture is the j for which the combined centre of gravity (CoG), with j
 turned up, is lowest above the lowest point; on a tie, the first in the order +x ... -z. If any
 direction lies along ``up``, only those are compared: the product description demands that ``up``
 points up, and a product turned onto its side violates that.

@@ -243,8 +243,8 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
     for _ in range(HALVINGS):
         middle = (same + flipped) / 2
-        there = _blocked_point(pairs, tolerance + middle * step)
-        if (there is None) == (point is None):
+        changed = _blocked_point(pairs, tolerance + middle * step)
+        if (changed is None) == (point is None):
             same = middle
         else:
             flipped = middle

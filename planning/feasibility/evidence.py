@@ -72,7 +72,7 @@ class Evidence:
         threads: Screw threads recognised in the meshes.
         fragile: Decisions with a small margin, those that the plan depends on first.
         remarks: What was assumed or repaired while the product was read.
-        motions: Local freedom and slanted removal directions, if they were asked for.
+        motions: Local freedom and slanted removal directions, if they were requested.
     """
 
     tolerance: float

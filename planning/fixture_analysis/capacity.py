@@ -20,7 +20,7 @@ import numpy as np
 from cell.fixtures.soft_jig import JigParameters
 from cell.fixtures.soft_jig.frozen.yielding import Strength
 from planning.fixture_analysis.imprint import Imprint
-from planning.fixture_analysis.loads import Load
+from planning.fixture_analysis.loads import OperationLoad
 
 
 def wall_strength(jig: JigParameters) -> float:
@@ -31,7 +31,7 @@ def wall_strength(jig: JigParameters) -> float:
 
 
 def sideways_capacity(
-    imprint: Imprint, jig: JigParameters, weight: float, p_G: np.ndarray, load: Load
+    imprint: Imprint, jig: JigParameters, weight: float, p_G: np.ndarray, load: OperationLoad
 ) -> float:
     """Return the smallest sideways force that moves the body, over the load's directions [N].
 
@@ -55,7 +55,9 @@ def sideways_capacity(
     return min(capacities)
 
 
-def turning_capacity(imprint: Imprint, jig: JigParameters, weight: float, load: Load) -> float:
+def turning_capacity(
+    imprint: Imprint, jig: JigParameters, weight: float, load: OperationLoad
+) -> float:
     """Return the torque about the vertical that friction under the base withstands [N m].
 
     That of a disc of the bearing area under uniform pressure: mu (W + F) 2/3 r.

@@ -15,7 +15,7 @@ from planning.fixture_analysis.candidate import Candidate, FixtureSetup, Proposa
 from planning.fixture_analysis.capacity import sideways_capacity, turning_capacity
 from planning.fixture_analysis.footprint import footprint, standing_points
 from planning.fixture_analysis.grip import GripAnalysis
-from planning.fixture_analysis.imprint import Imprint, Surface, depth_in_bed, press, samples_of
+from planning.fixture_analysis.imprint import Imprint, PartSurface, depth_in_bed, press, samples_of
 from planning.fixture_analysis.loads import operation_load
 from planning.fixture_analysis.support import SupportAnalysis
 
@@ -37,7 +37,7 @@ class Evaluator:
         self.support = SupportAnalysis(product, matrices)
         self.grip = GripAnalysis(product, matrices.solids, setup.gripper_stroke)
         self._lows: dict[tuple[str, bytes], float] = {}
-        self._samples: dict[str, Surface] = {}
+        self._samples: dict[str, PartSurface] = {}
         self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
 
     def evaluate(self, proposal: Proposal) -> Candidate:
@@ -69,7 +69,7 @@ class Evaluator:
             self._lows[name, key] = float((vertices @ R_JA[2]).min())
         return min(self._lows[name, key] for name in names)
 
-    def surface(self, name: str) -> Surface:
+    def surface(self, name: str) -> PartSurface:
         """Return points on a part's surface."""
         if name not in self._samples:
             self._samples[name] = samples_of(self.matrices.solids[name])

@@ -84,7 +84,7 @@ class Imprint:
 
 
 def depth_in_bed(
-    imprint: Imprint, part: Surface, R_JA: np.ndarray, p_middle: np.ndarray, low: float
+    imprint: Imprint, part: PartSurface, R_JA: np.ndarray, p_middle: np.ndarray, low: float
 ) -> float:
     """Return how deep a part that is added to the body would penetrate the frozen bed [m].
 
@@ -107,7 +107,7 @@ def depth_in_bed(
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
+class PartSurface:
     """Points spread over a part's surface, and a cache of those that face down per posture.
 
     Attributes:
@@ -132,7 +132,7 @@ class Surface:
         return self.below[key]
 
 
-def samples_of(solid: Solid) -> Surface:
+def samples_of(solid: Solid) -> PartSurface:
     """Return points spread over a part's surface in the product frame A, with a fixed seed."""
     mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
     count = max(FEWEST, round(mesh.area / SPACING**2))
@@ -140,7 +140,7 @@ def samples_of(solid: Solid) -> Surface:
     points, faces = sampled[0], sampled[1]
     areas = np.full(count, mesh.area / count)
     normals = mesh.face_normals[faces]
-    return Surface(SurfaceSamples(solid.name, points, normals, areas))
+    return PartSurface(SurfaceSamples(solid.name, points, normals, areas))
 
 
 def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
@@ -155,7 +155,7 @@ def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
 
 
 def press(
-    parts: Iterable[Surface],
+    parts: Iterable[PartSurface],
     R_JA: np.ndarray,
     p_middle: np.ndarray,
     jig: JigParameters,

@@ -18,7 +18,7 @@ FIT_FRICTION = 0.3  # [A] Of metal on metal, dry, 0.2-0.5: the share of an inser
 
 
 @dataclass(frozen=True, eq=False)
-class Load:
+class OperationLoad:
     """Forces of an operation on the body on the jig.
 
     Attributes:
@@ -46,7 +46,7 @@ def operation_load(
     piece: tuple[str, ...],
     p_middle: np.ndarray,
     low: float,
-) -> Load:
+) -> OperationLoad:
     """Return the load on the body while one piece is brought to it.
 
     Args:
@@ -66,10 +66,10 @@ def operation_load(
     p_JQ = R_JA @ mating_point(product, solids, proposal, piece)
     p_Q, height = p_JQ[:2] - p_middle, max(float(p_JQ[2]) - low, 1e-3)
     if proposal.approach == "above":
-        return Load(force, FIT_FRICTION * force, torque, p_Q, height)
+        return OperationLoad(force, FIT_FRICTION * force, torque, p_Q, height)
     along = [-(R_JA @ unit_vector(j))[:2] for j in proposal.sideways]
     pushes = tuple(p for p in PUSH_DIRECTIONS if any(p @ a > 0.5 for a in along))
-    return Load(0.0, force, torque, p_Q, height, pushes)
+    return OperationLoad(0.0, force, torque, p_Q, height, pushes)
 
 
 def mating_point(

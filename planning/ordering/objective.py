@@ -29,7 +29,7 @@ from planning.fixture_analysis.footprint import (
     footprint,
     standing_points,
 )
-from planning.fixture_analysis.imprint import Surface, press, samples_of
+from planning.fixture_analysis.imprint import PartSurface, press, samples_of
 from planning.ordering.items import Items, as_set, members
 from planning.ordering.search import Cost
 
@@ -58,7 +58,7 @@ class Objective:
     _stages: dict[int, tuple[int, int]] = field(default_factory=dict)
     _outlines: dict[int, Footprint | None] = field(default_factory=dict)
     _bearing: dict[int, Footprint | None] = field(default_factory=dict)
-    _surfaces: dict[str, Surface] = field(default_factory=dict)
+    _surfaces: dict[str, PartSurface] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Compute extent, mass and moment of each item along ``up``."""

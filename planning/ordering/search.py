@@ -27,7 +27,7 @@ PartialOrder = tuple[Cost, tuple[int, ...]]  # Cost and items removed, in the or
 
 
 class Undecided(Exception):
-    """The search gave up before it could tell whether there is an order."""
+    """The search reached its limit before it could decide whether an order exists."""
 
 
 @dataclass(frozen=True)

@@ -25,7 +25,7 @@ from planning.fixture_analysis.capacity import (
 from planning.fixture_analysis.footprint import footprint
 from planning.fixture_analysis.grip import BELOW, GripAnalysis
 from planning.fixture_analysis.imprint import Imprint, press, samples_of
-from planning.fixture_analysis.loads import Load
+from planning.fixture_analysis.loads import OperationLoad
 from planning.fixture_analysis.rule import general_rule
 from planning.fixture_analysis.support import SupportAnalysis
 
@@ -94,7 +94,7 @@ def embedded(width: float, depth: float, cell: float = 1e-4) -> Imprint:
 @pytest.mark.parametrize(("depth", "expected"), [(5e-3, 2.2), (10e-3, 6.6), (15e-3, 13.8)])
 def test_capacity_is_that_of_the_formula(depth, expected):
     """[D] The formula for a motor 34.8 mm wide, 1.86 N, pushed 40 mm up, by hand."""
-    load = Load(0.0, 1.0, 0.0, np.zeros(2), 0.040)
+    load = OperationLoad(0.0, 1.0, 0.0, np.zeros(2), 0.040)
     found = sideways_capacity(embedded(34.8e-3, depth), JIG, 1.86, np.zeros(2), load)
     wall = wall_strength(JIG) * 34.8e-3 * depth
     by_hand = min(wall + 0.9 * 1.86, (1.86 * 17.4e-3 + wall * depth / 2) / 0.040)
@@ -103,7 +103,7 @@ def test_capacity_is_that_of_the_formula(depth, expected):
 
 
 def test_a_low_push_slides_instead_of_tipping():
-    load = Load(0.0, 1.0, 0.0, np.zeros(2), 1e-3)
+    load = OperationLoad(0.0, 1.0, 0.0, np.zeros(2), 1e-3)
     found = sideways_capacity(embedded(34.8e-3, 5e-3), JIG, 1.86, np.zeros(2), load)
     wall = wall_strength(JIG) * 34.8e-3 * 5e-3
     assert found == pytest.approx(wall + 0.9 * 1.86, rel=1e-3)
@@ -114,7 +114,7 @@ def test_a_load_beside_the_footprint_tips_it():
     shallow = embedded(34.8e-3, 1e-3)
     bears = [
         sideways_capacity(
-            shallow, JIG, 1.86, np.zeros(2), Load(10.0, 1.0, 0.0, np.array([x, 0.0]), 0.04)
+            shallow, JIG, 1.86, np.zeros(2), OperationLoad(10.0, 1.0, 0.0, np.array([x, 0.0]), 0.04)
         )
         for x in (0.0, 37.4e-3)
     ]
@@ -136,7 +136,7 @@ def test_an_infinite_strength_factor_keeps_the_strength_of_the_beads():
 def test_turning_is_borne_by_friction_of_a_disc():
     """The torque is mu W 2/3 r, r of the disc of equal area."""
     post = embedded(34.8e-3, 5e-3)
-    load = Load(10.0, 3.0, 0.5, np.zeros(2), 0.04)
+    load = OperationLoad(10.0, 3.0, 0.5, np.zeros(2), 0.04)
     expected = 0.9 * 11.86 * 2 / 3 * 34.8e-3 / np.sqrt(np.pi)
     assert turning_capacity(post, JIG, 1.86, load) == pytest.approx(expected, rel=1e-3)
 
