@@ -30,12 +30,13 @@ def unit_vector(direction: str) -> np.ndarray:
 def rotation_with_up(up: str) -> RotationMatrix:
     """Return R_JA that turns the product so that its axis ``up`` points along +z of the jig.
 
-    It is the shortest rotation that does so: the identity for "+z"; "-z" turns about x.
+    The product's x axis stays along that of the jig; if ``up`` is along x, its y axis points along
+    the jig's x. Compose with a rotation about z for another yaw.
     """
     axis = unit_vector(up)
     if up == "-z":
-        return RotationMatrix(np.diag([1.0, -1.0, -1.0]))
-    x = unit_vector("+x") if axis_index(up) != 0 else -np.sign(axis[0]) * unit_vector("+z")
+        return RotationMatrix.MakeXRotation(np.pi)
+    x = unit_vector("+x") if axis_index(up) != 0 else unit_vector("+y")
     return RotationMatrix(np.stack([x, np.cross(axis, x), axis]))  # Rows: axes of J in A.
 
 
