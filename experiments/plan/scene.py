@@ -59,22 +59,17 @@ def picture(shown: Sequence[SceneItem]) -> tuple[bytes, View]:
     scene_graph = builder.AddSystem(SceneGraph())
     source = scene_graph.RegisterSource("picture")
     for number, item in enumerate(shown):
-        scene_graph.RegisterAnchoredGeometry(source, _geometry(item, number))
+        file = MemoryFile(obj_text(item.mesh, normals=True), ".obj", f"part {number}")
+        mesh = Mesh(InMemoryMesh(mesh_file=file))
+        geometry = GeometryInstance(RigidTransform(), mesh, f"part {number}")
+        properties = PerceptionProperties()
+        properties.AddProperty("phong", "diffuse", Rgba(*item.color, 1.0))
+        geometry.set_perception_properties(properties)
+        scene_graph.RegisterAnchoredGeometry(source, geometry)
     diagram = builder.Build()
     view = view_of(item.mesh for item in shown if item.frame)
     context = diagram.CreateDefaultContext()
     return take_picture(scene_graph, context, view, shadows=False), view
-
-
-def _geometry(item: SceneItem, number: int) -> GeometryInstance:
-    file = MemoryFile(obj_text(item.mesh, normals=True), ".obj", f"part {number}")
-    geometry = GeometryInstance(
-        RigidTransform(), Mesh(InMemoryMesh(mesh_file=file)), f"part {number}"
-    )
-    properties = PerceptionProperties()
-    properties.AddProperty("phong", "diffuse", Rgba(*item.color, 1.0))
-    geometry.set_perception_properties(properties)
-    return geometry
 
 
 def view_of(meshes: Iterable[trimesh.Trimesh]) -> View:

@@ -89,7 +89,13 @@ def freedom_along(
     across = np.cross(side, direction)
     across /= np.linalg.norm(across)
     R = np.array([across, np.cross(direction, across), direction])  # Brings the direction to +z.
-    views = [[_turned(solid, R) for solid in solids] for solids in (incoming, target)]
+    views = [
+        [
+            envelope(Solid(s.name, s.vertices @ R.T, s.faces, s.mass, R @ s.p_AoG), axis=2)
+            for s in solids
+        ]
+        for solids in (incoming, target)
+    ]
     x, y, z = (float(value) for value in direction)
     furthest = Freedom((x, y, z), np.inf, "")
     for moving in views[0]:
@@ -195,8 +201,3 @@ def _distinct(directions: np.ndarray, weights: np.ndarray) -> np.ndarray:
         if not len(kept) or (kept @ direction).max() < SAME_DIRECTION:
             kept = np.vstack([kept, direction])
     return kept
-
-
-def _turned(solid: Solid, R: np.ndarray) -> Envelope:
-    turned = Solid(solid.name, solid.vertices @ R.T, solid.faces, solid.mass, R @ solid.p_AoG)
-    return envelope(turned, 2)

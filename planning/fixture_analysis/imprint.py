@@ -181,12 +181,12 @@ def press(
     )
     lowest = float(points[:, 2].min())
     points = points[points[:, 2] <= lowest + jig.bag.cap_height]
-    bed, apex = _bed(jig), jig.bag.cap_height
+    bed, apex = _bed_of(jig), jig.bag.cap_height
     bed.inflate()
     cap = bed.heights.copy()
     descent = _Descent(bed, body, p_middle, apex - lowest)
     depth, borne = descent.down_to(force, apex - jig.bag.floor)
-    return _read(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
+    return _imprint(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,12 +233,12 @@ class _Descent:
 
 
 @cache
-def _bed(jig: JigParameters) -> Bed:
+def _bed_of(jig: JigParameters) -> Bed:
     """Return one bed for all imprints of a jig; it is re-inflated for each."""
     return Bed(jig.bag, jig.soil)
 
 
-def _read(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
+def _imprint(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
     """Return the imprint: the bed's surface and the body's underside above it.
 
     Args:
