@@ -1,14 +1,15 @@
 # Every verb creates and uses its own .venv from requirements.lock, once.
-PYTHON ?= python3
+# .ci/find-python says with which Python; PYTHON=... on the command line or in the environment wins.
 VENV := .venv
 BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 ARGS ?=
 
-.PHONY: help setup system run test test-slow regress check format models clean
+.PHONY: help setup find-python system run test test-slow regress check format models clean
 
 help:
 	@echo "make setup      environment from the lock file, and what rendering needs of the system"
+	@echo "                (PYTHON=/path/to/python3.13 chooses the Python, 3.12 or 3.13)"
 	@echo "make run        set up, then assemble the motor unit in the twin; report in out/run (ARGS=... adds options)"
 	@echo "make test       set up, then run the fast tests"
 	@echo "make test-slow  long simulations"
@@ -19,6 +20,9 @@ help:
 	@echo "make clean      remove the environment and everything generated outside models/"
 
 setup: system $(INSTALLED)
+
+find-python:
+	@.ci/find-python
 
 run: setup
 	$(BIN)/soft-jig assemble --out out/run $(ARGS)
@@ -43,17 +47,20 @@ format: $(INSTALLED)
 
 models: $(INSTALLED)
 	$(BIN)/python -m cell.cad
-	$(BIN)/python -m cell.configuration.config_yaml
+	$(BIN)/python -m cell.configuration
 
 clean:
-	rm -rf $(VENV) build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
+	rm -rf $(VENV) .uv build dist out *.egg-info .pytest_cache .ruff_cache .hypothesis
 	find cell planning experiments tests -name __pycache__ -type d -prune -exec rm -rf {} +
 
+# An environment of a Python that no longer suits, or no longer runs, is made anew.
 # A Debian without the package python3-venv cannot put pip into an environment; its pip can.
 $(INSTALLED): requirements.lock pyproject.toml
-	@test -x $(BIN)/pip || $(PYTHON) -m venv $(VENV) || { \
-	  $(PYTHON) -m venv --clear --without-pip $(VENV) && \
-	  $(PYTHON) -m pip --python $(BIN)/python install pip; }
+	@test -x $(BIN)/pip && PYTHON=$(BIN)/python .ci/find-python >/dev/null 2>&1 || { \
+	  python=$$(.ci/find-python) && echo "$(VENV): $$("$$python" --version), $$python" && { \
+	    "$$python" -m venv --clear $(VENV) || { \
+	      "$$python" -m venv --clear --without-pip $(VENV) && \
+	      "$$python" -m pip --python $(BIN)/python install pip; }; }; }
 	$(BIN)/pip install -r requirements.lock
 	$(BIN)/pip install -e . --no-deps
 	@touch $@

@@ -1,37 +1,40 @@
-"""Build the cell: two arms with tools, soft jig on a force plate, tray and parts, in one plant."""
+"""Build the cell: arms with tools, a fixture on a force plate, tray and parts, in one plant.
+
+The whole cell on one screen: `add_cell` puts it into a caller's diagram, `build_cell` into one of
+its own. A program that steps either with Drake's own `Simulator` needs one line more:
+``simulator.set_monitor(cell.monitor)``.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import AbstractContextManager, contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.multibody.tree import RigidBody, WeldJoint
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.configuration.config import CellConfig
-from cell.fixtures.soft_jig import SoftJig
-from cell.machines.arm import Arm, Drive, add_arm
-from cell.machines.jig_base import JigBase
+from cell.errors import UnknownName
+from cell.fixtures import add_fixture
+from cell.fixtures.base import Fixture
+from cell.fixtures.wiring import wire_fixture
+from cell.machines.arm import Arm
+from cell.machines.devices import add_arms, make_drives
+from cell.machines.drive import JointDrive
+from cell.machines.driver import Driver
+from cell.machines.jig_base import JigBase, set_sliding_friction
 from cell.machines.sensors import WrenchSensor
-from cell.machines.tools import (
-    Driver,
-    Gripper,
-    connect_driver,
-    connect_gripper,
-    set_driver_gains,
-    set_gripper_gains,
-)
-from cell.paths import model_url, new_parser
+from cell.machines.workcell import add_workcell
+from cell.monitor import Monitor, StepCounter
+from cell.ports import Ports, add_part_poses
 from cell.products.product import Product
+from cell.sleep import Sleep
 from cell.workpieces.parts import Parts, add_parts
-from cell.workpieces.thread import Thread, add_thread
+from cell.workpieces.threads import Threads, add_threads
 
-# The jaws wait this far open [m]: wide enough for the motor, narrow enough to see that they move.
-JAW_REST = 0.045
+Extend = Callable[[MultibodyPlant, SceneGraph], None]
 
 
 @dataclass(frozen=True)
@@ -42,15 +45,15 @@ class Cell:
         config: What it was built from.
         product: The product whose parts are in it.
         plant, scene_graph: Plain Drake.
-        left, right: The arms; the left one carries the gripper, the right one the driver.
-        drives: Inputs of each arm, by arm name.
-        gripper, driver: The tools.
-        jig_base: What the jig's bag sits on, bolted down or free on the force plate.
-        soft_jig: The jig.
+        arms: By name; each carries a tool.
+        jig_base: What the fixture sits on, bolted down or free on the force plate.
+        fixture: Holds a part on the base.
         parts: The loose parts.
-        threads: By the name of the bolt.
-        wrists: Wrist wrench sensors, by arm name.
+        threads: Of the product's bolts.
+        sleeper: Puts parts and base to sleep.
         force_plate: Wrench sensor under the jig.
+        ports: Inputs and outputs by name.
+        monitor: For `Simulator.set_monitor`.
         diagram: The built diagram; None until the caller of `add_cell` has built theirs.
     """
 
@@ -58,109 +61,150 @@ class Cell:
     product: Product
     plant: MultibodyPlant
     scene_graph: SceneGraph
-    left: Arm
-    right: Arm
-    drives: Mapping[str, Drive]
-    gripper: Gripper
-    driver: Driver
+    arms: Mapping[str, Arm]
     jig_base: JigBase
-    soft_jig: SoftJig
+    fixture: Fixture
     parts: Parts
-    threads: Mapping[str, Thread]
-    wrists: Mapping[str, WrenchSensor]
+    threads: Threads
+    sleeper: Sleep
     force_plate: WrenchSensor
+    ports: Ports
+    monitor: Monitor
     diagram: Diagram | None = None
 
+    def with_diagram(self, diagram: Diagram) -> Cell:
+        """Return the cell with the diagram that a caller has built around it."""
+        return replace(self, diagram=diagram)
+
+    def arm_with(self, role: str) -> Arm:
+        """Return the first arm whose tool has a role: "gripper" or "driver".
+
+        Raises:
+            UnknownName: No arm carries such a tool.
+        """
+        for arm in self.arms.values():
+            if arm.tool.role == role:
+                return arm
+        raise UnknownName("arm with a", role, {arm.tool.role for arm in self.arms.values()})
+
     @property
-    def arms(self) -> Mapping[str, Arm]:
-        """The arms by name."""
-        return {"left": self.left, "right": self.right}
+    def holder(self) -> Arm:
+        """The arm that grips parts."""
+        return self.arm_with("gripper")
+
+    @property
+    def driver(self) -> Arm:
+        """The arm that drives bolts."""
+        return self.arm_with("driver")
+
+    @property
+    def drives(self) -> dict[str, JointDrive]:
+        """What each device is told, by the name of the device."""
+        tools = {arm.tool.name: arm.tool.drive for arm in self.arms.values()}
+        return {arm.name: arm.drive for arm in self.arms.values()} | tools
 
     @property
     def X_WJ(self) -> RigidTransform:
         """Pose of the jig frame where the base was set down."""
         return self.config.workcell.X_WJ
 
-    def reset(self, root: Context) -> None:
-        """Put a new Context into the initial state: threads open, parts asleep, bag inflated.
 
-        Drake has every constraint active in a default Context, those of all threads and bits too.
+def build_cell(config: CellConfig, product: Product, *, extend: Extend | None = None) -> Cell:
+    """Build the cell for one product, as a diagram of its own.
 
-        Args:
-            root: Context of the diagram that the cell was built into.
-        """
-        self.parts.reset(root)
-        self.jig_base.reset(root, self.X_WJ)
-        for thread in self.threads.values():
-            thread.reset(root)
-        for arm in self.arms.values():
-            arm.use_position_drive()
-        for body in self.soft_jig.pressing:
-            self.soft_jig.release(body)
-        self.soft_jig.inflate(root)
-
-
-def build_cell(config: CellConfig, product: Product) -> Cell:
-    """Build the simulated cell for one product, as a diagram of its own."""
-    builder = DiagramBuilder()
-    cell = add_cell(builder, config, product)
-    return replace(cell, diagram=builder.Build())
-
-
-def add_cell(builder: DiagramBuilder, config: CellConfig, product: Product) -> Cell:
-    """Add the cell to a caller's diagram; with nothing else connected the arms hold.
-
-    Reset each Context with `Cell.reset` before it is stepped. The diagram owns all that it steps
-    with; the cell is needed for handles only.
+    Its ports are those of the diagram; the arguments are those of `add_cell`.
     """
+    builder = DiagramBuilder()
+    cell = add_cell(builder, config, product, extend=extend)
+    cell.ports.export(builder)
+    return cell.with_diagram(builder.Build())
+
+
+def add_cell(
+    builder: DiagramBuilder,
+    config: CellConfig,
+    product: Product,
+    *,
+    name: str = "",
+    extend: Extend | None = None,
+) -> Cell:
+    """Add the cell to a caller's diagram; with nothing connected to its ports the arms hold.
+
+    Args:
+        builder: The caller's. The diagram owns all that it steps with; the returned cell is needed
+            for handles only.
+        config: Every number of the cell.
+        product: What is to be assembled; every part needs a simulation model.
+        name: Tells two cells in one builder apart.
+        extend: Called with plant and scene graph before the plant is finalized: adds bodies of the
+            caller's own.
+
+    Raises:
+        InputError: A product without simulation models, an unknown device or fixture.
+    """
+    product.check_simulable()
+    prefix = f"{name}_" if name else ""
+    counter = builder.AddNamedSystem(f"{prefix}steps", StepCounter(config.simulation.time_step))
+    drives = make_drives(config)
+    for arm, own in drives.items():
+        # Before the plant: see `cell.machines.drive`.
+        builder.AddNamedSystem(f"{prefix}{arm}_drive", own.arm)
+        builder.AddNamedSystem(f"{prefix}{own.tool_name}_drive", own.tool)
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
-    plate_weld, base = add_workcell(plant, config, product)
-    jig_base = JigBase.prepare(plant, scene_graph, plate_weld, base, config)
-    left, right = add_arms(plant, config)
-    parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
-    threads = add_threads(plant, scene_graph, product, parts, right)
-    soft_jig = SoftJig.add(plant, scene_graph, base, config.jig)
-    soft_jig.filters_lifted = _filters_lifted(parts, jig_base)
-    for thread in threads.values():
-        thread.filters_lifted = soft_jig.filters_lifted
+    plant.set_name(f"{prefix}plant")
+    scene_graph.set_name(f"{prefix}scene_graph")
+    workcell = add_workcell(plant, config, product.tray)
+    if not config.workcell.jig_base_fixed:
+        for sliding in (workcell.plate, workcell.base):
+            set_sliding_friction(plant, scene_graph, sliding, config.push.base_friction)
+    arms = add_arms(plant, config, drives)
+    parts = add_parts(plant, product, config.workcell.X_WT)
+    drivers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Driver)]
+    threads = add_threads(plant, scene_graph, product, parts, next(iter(drivers), None))
+    kind = config.workcell.fixture
+    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig)
+    for part in parts:
+        fixture.add_part(plant, part.body, part.part.mesh)
+    if extend is not None:
+        extend(plant, scene_graph)
     plant.Finalize()
-    drives = {
-        arm.name: Drive.connect(builder, plant, arm.instance, arm.home) for arm in (left, right)
-    }
-    gripper = connect_gripper(builder, plant, left.tool, JAW_REST)
-    driver = connect_driver(builder, plant, right.tool)
-    wrists = {arm.name: WrenchSensor(plant, arm.wrist) for arm in (left, right)}
-    force_plate = WrenchSensor(plant, plate_weld)
+
+    bearers = (workcell.base, workcell.plate)
+    wiring = wire_fixture(builder, plant, scene_graph, fixture, bearers, prefix)
+    builder.AddNamedSystem(f"{prefix}threads", threads)
+    force_plate = WrenchSensor(plant, workcell.plate_weld)
+    ports = Ports()
+    for arm in arms.values():
+        ports.add(*arm.connect(builder, prefix))
+    ports.add({}, {"force_plate": force_plate.connect(builder, f"{prefix}force_plate")})
+    ports.add({}, add_part_poses(builder, f"{prefix}part_poses", plant, parts))
+    for port in fixture.inputs():
+        ports.inputs[f"jig.{port.get_name()}"] = port
+    for port in fixture.outputs():
+        ports.outputs[f"jig.{port.get_name()}"] = port
+    ports.inputs["external_forces"] = wiring.forces.GetInputPort("external")
+    jig_base = JigBase(config, plant, workcell.base, workcell.plate, wiring.sleeper)
+
+    def reset(root: Context) -> None:
+        threads.reset(root)
+        jig_base.reset(root)
+        fixture.install(root)
+
     return Cell(
         config=config,
         product=product,
         plant=plant,
         scene_graph=scene_graph,
-        left=left,
-        right=right,
-        drives=drives,
-        gripper=gripper,
-        driver=driver,
+        arms=arms,
         jig_base=jig_base,
-        soft_jig=soft_jig,
-        parts=parts,
+        fixture=fixture,
+        parts=replace(parts, sleeper=wiring.sleeper),
         threads=threads,
-        wrists=wrists,
+        sleeper=wiring.sleeper,
         force_plate=force_plate,
+        ports=ports,
+        monitor=Monitor(counter, reset, (fixture, threads)),
     )
-
-
-def _filters_lifted(
-    parts: Parts, jig_base: JigBase
-) -> Callable[[Context], AbstractContextManager[None]]:
-    """Return what lifts the filters of everything that sleeps, given the root context."""
-
-    @contextmanager
-    def lifted(root: Context) -> Iterator[None]:
-        with parts.filters_lifted(root), jig_base.filters_lifted(root):
-            yield
-
-    return lifted
 
 
 def plant_config(config: CellConfig) -> MultibodyPlantConfig:
@@ -170,62 +214,3 @@ def plant_config(config: CellConfig) -> MultibodyPlantConfig:
         discrete_contact_approximation=config.simulation.contact_approximation,
         contact_model="hydroelastic_with_fallback",
     )
-
-
-def add_arms(plant: MultibodyPlant, config: CellConfig) -> tuple[Arm, Arm]:
-    """Add both arms with their tools."""
-    left = add_arm(plant, "left", "hand_e", config.left_arm)
-    right = add_arm(plant, "right", "screwdriver", config.right_arm)
-    set_gripper_gains(plant, left.tool)
-    set_driver_gains(plant, right.tool)
-    return left, right
-
-
-def add_workcell(
-    plant: MultibodyPlant, config: CellConfig, product: Product
-) -> tuple[WeldJoint, RigidBody]:
-    """Add table, riser, force plate, jig base and tray.
-
-    Returns:
-        The weld under the force plate, where it reads, and the jig base.
-    """
-    X_WJ = config.workcell.X_WJ
-    _add_static(plant, "table", RigidTransform())
-    _add_static(plant, "riser", X_WJ)
-    weld = _add_static(plant, "force_plate", X_WJ)
-    (instance,) = new_parser(plant).AddModelsFromUrl(model_url("jig_base"))
-    jig_base = plant.GetBodyByName("jig_base", instance)
-    if config.workcell.jig_base_fixed:
-        plant.WeldFrames(weld.frame_on_child(), jig_base.body_frame())
-    else:
-        plant.SetDefaultFloatingBaseBodyPose(jig_base, X_WJ)
-    if product.tray is not None:
-        _add_static(plant, product.tray, config.workcell.X_WT)
-    return weld, jig_base
-
-
-def _add_static(plant: MultibodyPlant, model: str, X_WM: RigidTransform) -> WeldJoint:
-    """Add a one-body model, welded: contact with ``world_body()`` itself crashes some plants."""
-    (instance,) = new_parser(plant).AddModelsFromUrl(model_url(model))
-    body = plant.get_body(plant.GetBodyIndices(instance)[0])
-    return plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WM)
-
-
-def add_threads(
-    plant: MultibodyPlant, scene_graph: SceneGraph, product: Product, parts: Parts, driver: Arm
-) -> dict[str, Thread]:
-    """Add the tapped hole and the open ties of every fastener of the product."""
-    plant.AddModelInstance("threads")
-    threads = {}
-    for name, fastener in product.fasteners.items():
-        X_AI = product.parts[fastener.into].X_AP
-        threads[name] = add_thread(
-            plant,
-            scene_graph,
-            fastener,
-            bolt=parts[name].body,
-            into=parts[fastener.into].body,
-            X_IH=X_AI.inverse() @ product.parts[name].X_AP,
-            bit_frame=driver.frame("bit_tip"),
-        )
-    return threads

@@ -7,6 +7,8 @@ from pathlib import Path
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
+from cell.errors import UnknownName
+
 MODELS = Path(__file__).resolve().parent.parent / "models"
 
 
@@ -21,3 +23,15 @@ def new_parser(plant: MultibodyPlant) -> Parser:
 def model_url(name: str) -> str:
     """Return the URL of ``models/sdf/<name>/<name>.sdf``."""
     return f"package://soft_jig_models/sdf/{name}/{name}.sdf"
+
+
+def model_folder(name: str) -> Path:
+    """Return the folder of an SDF model that a product names: ``models/sdf/<name>``.
+
+    Raises:
+        UnknownName: There is no such model.
+    """
+    known = [file.stem for file in (MODELS / "sdf").glob("*/*.sdf")]
+    if name not in known:
+        raise UnknownName("model", name, known)
+    return MODELS / "sdf" / name

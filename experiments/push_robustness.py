@@ -31,33 +31,32 @@ from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.configuration.config import CellConfig
+from cell.configuration.sections import entries
 from cell.errors import CellError
 from cell.products.loading import load_product
 from experiments.cli.common import BadUsage, Common
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases
-from experiments.paper.place_push import ATMOSPHERE, cases_of, with_pressure
+from experiments.paper.place_push import cases_of
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import versions
 
-# Path in the configuration -> its range in the sources, for the table.
-PARAMETERS = {
-    "push.jig_mass": "1 to 3 kg [A]",
-    "push.base_friction": "0.3 to 0.6 [A]",
-    "push.speed": "0.22 to 0.29 m/s [D]",
-    "push.acceleration": "any [A]",
-    "push.start_gap": "0.5 to 5 mm [A]",
-    "push.height_fraction": "0.5 to 0.7 [A]",
-    "placement.press_force": "15 to 30 N [A]",
-    "jig.vacuum.pressure": "about 90 kPa [S]",
-    "jig.soil.membrane_modulus": "100 to 150 N/m [R]",
-    "jig.soil.friction_angle": "22 to 28 deg [R]",
-    "jig.jammed.friction": "0.6 to 1.3 [R]",
-    "jig.jammed.pressure_gradient": "2e8 to 1.3e9 Pa/m [D]",
-    "jig.suction.strength": "0 to 90 kPa [A]",
-}
-# Draws stop at what is possible.
-LARGEST = {"jig.vacuum.pressure": ATMOSPHERE, "push.height_fraction": 1.0}
+# Paths in the configuration; the plausible range of each stands in its source.
+PARAMETERS = (
+    "push.jig_mass",
+    "push.base_friction",
+    "push.speed",
+    "push.acceleration",
+    "push.start_gap",
+    "push.height_fraction",
+    "placement.press_force",
+    "jig.vacuum.pressure",
+    "jig.soil.membrane_modulus",
+    "jig.soil.friction_angle",
+    "jig.jammed.friction",
+    "jig.jammed.pressure_gradient",
+    "jig.suction.strength",
+)
 AS_CONFIGURED = "as configured"
 GRAVITY = 9.81  # [m/s2]
 NUMERICS = {
@@ -94,7 +93,7 @@ class Options:
     """Also halve the time step, refine the bed's mesh, and take other contact approximations."""
 
     controls: bool = False
-    """Also push without suction, at 30 kPa, on the bed left soft, and on a flat rigid block."""
+    """Also push without suction, at 30 kPa, on the bed left soft, and on a flat rigid plate."""
 
     workers: Annotated[int, arg(metavar="CORES")] = 1
     """Variants at a time."""
@@ -109,12 +108,10 @@ class Variant:
     Attributes:
         name: For the table.
         changes: What differs from the configuration.
-        bed: "soft" or "rigid".
     """
 
     name: str
     changes: Changes = field(default_factory=dict)
-    bed: str = "soft"
 
 
 def value_at(config: CellConfig, path: str) -> float:
@@ -126,9 +123,10 @@ def value_at(config: CellConfig, path: str) -> float:
 
 
 def scaled(config: CellConfig, factors: Mapping[str, float]) -> Changes:
-    """Return the numbers of the configuration at some paths, multiplied."""
+    """Return the numbers of the configuration at some paths, multiplied as far as is valid."""
+    infos = {entry.path: entry.info for entry in entries(config)}
     return {
-        path: min(value_at(config, path) * factor, LARGEST.get(path, np.inf))
+        path: infos[path].nearest(value_at(config, path) * factor)
         for path, factor in factors.items()
     }
 
@@ -148,7 +146,7 @@ def variants(options: Options, config: CellConfig) -> list[Variant]:
         found += [Variant(name, changes) for name, changes in NUMERICS.items()]
     if options.controls:
         found += [Variant(name, changes) for name, changes in CONTROLS.items()]
-        found.append(Variant("rigid block", bed="rigid"))
+        found.append(Variant("flat rigid plate", {"workcell.fixture": "flat_plate"}))
     if options.one_by_one:
         for path in PARAMETERS:
             for change in (options.spread, -options.spread):
@@ -164,7 +162,7 @@ def config_of(options: Options, variant: Variant) -> CellConfig:
     """Return a variant's configuration; raises `CellError` if it is impossible."""
     changes = [f"{path}={value}" for path, value in variant.changes.items()]
     common = replace(options.common, overrides=(*options.common.overrides, *changes))
-    return with_pressure(common.load_config(), None)
+    return common.load_config()
 
 
 def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
@@ -173,7 +171,6 @@ def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
         cases_of("push", options.case),
         product=load_product("motor_unit"),
         config=config_of(options, variant),
-        bed=variant.bed,
         trials=1,
         seed=options.common.seed,
     )
@@ -254,8 +251,11 @@ def _run(options: Options) -> int:
         raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
     cases_of("push", options.case)
     console = Console(quiet=options.common.quiet, highlight=False)
-    for path, source in PARAMETERS.items():
-        console.print(f"{path} = {value_at(config, path):g} (range {source})", markup=False)
+    infos = {entry.path: entry.info for entry in entries(config)}
+    for path in PARAMETERS:
+        info = infos[path]
+        text = f"{path} = {value_at(config, path):g} {info.unit}"
+        console.print(f"{text.rstrip()}. {info.source}", markup=False)
     speed = coasting_speed(config)
     console.print(f"Speed for the paper's 78.2 mm: {speed:.3f} m/s", markup=False)
     wanted = variants(options, config)

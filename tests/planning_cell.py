@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from pydrake.geometry import SceneGraph
@@ -12,23 +14,33 @@ from pydrake.multibody.tree import QuaternionFloatingJoint
 
 from cell.configuration.config import ArmConfig
 from cell.machines.arm import Arm, add_arm
+from cell.machines.arms import ArmModel
+from cell.machines.arms.ur import UR5E
 from cell.paths import model_url, new_parser
 from planning.motion.collision_model import CollisionModel
 
 P_WJ = [0.0, 0.15, 0.20]
 TOOL_DOWN = RollPitchYaw(np.pi, 0.0, 0.0)
-LEFT = ArmConfig(p_WB=(-0.55, 0.0, 0.0), rpy_deg=(0.0, 0.0, 180.0))
+LEFT = ArmConfig(p_WB=(-0.55, 0.0, 0.0))
 RIGHT = ArmConfig(p_WB=(0.55, 0.0, 0.0))
 
 
-def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
+def populate(
+    plant: MultibodyPlant, scene_graph: SceneGraph, model: ArmModel, gripper: str
+) -> Mapping[str, Arm]:
     X_WJ = RigidTransform(P_WJ)
     for name in ("table", "riser", "force_plate", "jig_base"):
         X_WM = RigidTransform() if name == "table" else X_WJ
         (instance,) = new_parser(plant).AddModelsFromUrl(model_url(name))
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(name, instance), X_WM)
+    left = replace(
+        LEFT,
+        home_deg=model.home_deg["gripper"],
+        stiffness=model.stiffness,
+        damping=model.damping,
+    )
     arms = {
-        "left": add_arm(plant, "left", "hand_e", LEFT),
+        "left": add_arm(plant, "left", gripper, left, model),
         "right": add_arm(plant, "right", "screwdriver", RIGHT),
     }
     for name in ("motor", "motor_plate"):
@@ -40,5 +52,10 @@ def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm
     return arms
 
 
-def planning_cell() -> CollisionModel:
-    return CollisionModel(populate, arm_clearance=0.02, obstacle_clearance=0.005)
+def planning_cell(model: ArmModel = UR5E, gripper: str = "hand_e") -> CollisionModel:
+    return CollisionModel(
+        partial(populate, model=model, gripper=gripper),
+        arm_clearance=0.02,
+        obstacle_clearance=0.005,
+        hand=("left", "tip"),
+    )

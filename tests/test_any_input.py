@@ -13,7 +13,7 @@ from step_files import step_assembly
 from tiny_products import box, product_of, rod, to_trimesh
 
 import cell.products.loading as loading
-from cell.errors import BadPart, CellError, UnknownName
+from cell.errors import BadPart, InputError, UnknownName
 from cell.products.identical import handedness, identical_parts
 from cell.products.loading import DEFAULT_DENSITY, load_product
 from experiments.cli.main import main
@@ -75,7 +75,7 @@ def test_gltf_keeps_names_and_poses(tmp_path: Path) -> None:
     assert list(product.parts) == ["left_pin", "right_pin"]
     assert product.parts["right_pin"].mesh.centroid[0] == pytest.approx(0.01)
     assert product.parts["left_pin"].mesh.volume == pytest.approx(pin.volume)
-    with pytest.raises(CellError, match="states its own units"):
+    with pytest.raises(InputError, match="states its own units"):
         load_product(tmp_path / "pins.glb", "mm")
 
 
@@ -102,7 +102,7 @@ def test_densities_are_of_parts_or_of_all(tmp_path: Path) -> None:
     assert not any("density" in remark for remark in product.remarks)
     with pytest.raises(UnknownName, match="No part 'bas'.*'base'"):
         load_product(file, densities={"bas": 1.0})
-    with pytest.raises(CellError, match="above zero"):
+    with pytest.raises(InputError, match="above zero"):
         load_product(file, densities={"": 0.0})
 
 
@@ -249,5 +249,5 @@ def test_two_files_of_one_name_and_broken_files_are_refused_by_name(tmp_path, ca
 def test_too_many_parts_are_refused_with_the_reason(tmp_path, monkeypatch) -> None:
     monkeypatch.setattr(loading, "MOST_PARTS", 1)
     folder_of(tmp_path, {"low": LOW, "high": HIGH})
-    with pytest.raises(CellError, match="has 2 parts, and plans are for up to 1: plan its sub"):
+    with pytest.raises(InputError, match="has 2 parts, and plans are for up to 1: plan its sub"):
         load_product(tmp_path, "mm")

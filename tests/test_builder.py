@@ -33,7 +33,7 @@ def test_cell_is_built_from_any_working_directory(
     cell = build_cell(CellConfig.load("default"), load_product("motor_unit"))
     assert cell.diagram is not None
     assert {part.part.name for part in cell.parts} == set(cell.product.parts)
-    assert set(cell.threads) == set(cell.product.fasteners)
+    assert set(cell.threads) == set(cell.product.screws)
 
 
 def test_callers_diagram_steps_after_the_handles_are_dropped() -> None:

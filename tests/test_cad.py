@@ -151,7 +151,7 @@ def test_head_friction_reproduces_the_nut_factor() -> None:
     arm = np.average(np.linalg.norm(from_axis, axis=1), weights=top.area_faces) * 1e3
     torque = mu.lumped_head_friction() * arm + mu.THREAD_PITCH / (2 * np.pi)
     assert torque == pytest.approx(0.202 * 3.0, rel=1e-4)
-    assert load_product("motor_unit").fasteners["bolt_1"].nut_factor == mu.NUT_FACTOR
+    assert load_product("motor_unit").screws["bolt_1"].nut_factor == mu.NUT_FACTOR
 
 
 def test_friction_radius_of_many_facets_is_that_of_a_round_ring() -> None:

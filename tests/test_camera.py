@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 
-from experiments.paper.camera import SCREW_RADIUS, Camera, metres_per_pixel, seen_displacement
+from cell.fixtures.jig_dimensions import SCREW_CIRCLE_RADIUS
+from experiments.paper.camera import Camera, metres_per_pixel, seen_displacement
 
 X_WJ = RigidTransform([0.0, 0.15, 0.2])
 # A click is off by half a pixel; the mean of four by less, and there are two pictures.
@@ -29,5 +30,5 @@ def test_printed_formula_sees_the_rotation() -> None:
     after = RigidTransform(RotationMatrix.MakeZRotation(angle), X_WJ.translation())
     seen, printed = seen_displacement(X_WJ, after)
     assert seen < PIXEL
-    chord = 2 * SCREW_RADIUS * np.sin(angle / 2)
+    chord = 2 * SCREW_CIRCLE_RADIUS * np.sin(angle / 2)
     assert printed == pytest.approx(np.sqrt(2) * chord, abs=2 * PIXEL)

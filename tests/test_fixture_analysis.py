@@ -10,6 +10,7 @@ import pytest
 from tiny_products import bolted, box, peg_in_hole, product_of, rod, tube_and_pins
 
 from cell import CellConfig
+from cell.errors import InputError
 from cell.fixtures.soft_jig import JigParameters
 from cell.products.loading import load_product
 from cell.products.product import Product
@@ -181,7 +182,7 @@ def test_fastened_parts_do_not_fall():
     product = bolted()
     support = support_of(product)
     assert support.dropped(("base", "lid", "bolt"), "-z") == []
-    loose = support_of(replace(product, fasteners={}))
+    loose = support_of(replace(product, joints=product.fits))
     assert loose.dropped(("base", "lid", "bolt"), "-z") != []
 
 
@@ -202,6 +203,14 @@ def test_grip_needs_a_place_narrower_than_the_stroke(size, obstacle):
     )
     assert width == pytest.approx(min(size[:2]) * 1e-3) and found == obstacle
     assert SETUP.gripper_stroke == pytest.approx(0.050)
+
+
+def test_the_configured_gripper_decides_the_stroke():
+    arms = CellConfig().arms
+    wide = replace(CellConfig(), arms={**arms, "left": replace(arms["left"], tool="gripper_85")})
+    assert FixtureSetup.of(wide).gripper_stroke == pytest.approx(0.085)
+    with pytest.raises(InputError, match="No arm carries a gripper"):
+        FixtureSetup.of(replace(CellConfig(), arms={"right": arms["right"]}))
 
 
 def test_declared_grasps_decide_and_must_not_come_from_below():

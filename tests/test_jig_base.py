@@ -13,7 +13,7 @@ from planning.operations.stroke import Stroke
 
 def empty_cell(fixed: bool) -> Cell:
     config = CellConfig.load(overrides=[f"workcell.jig_base_fixed={str(fixed).lower()}"])
-    product = replace(load_product("motor_unit"), parts={}, fasteners={}, fits=(), groups={})
+    product = replace(load_product("motor_unit"), parts={}, joints=(), groups={})
     return build_cell(config, product)
 
 

@@ -1,4 +1,4 @@
-"""Inverse kinematics: every solution is one, and none is missing."""
+"""Kinematics of an arm that stands in the cell with a tool on its flange."""
 
 from __future__ import annotations
 
@@ -12,9 +12,7 @@ from planning.motion.collision_model import CollisionModel
 from planning.motion.kinematics import (
     LIMIT_MARGIN,
     Unreachable,
-    flange_pose,
     ik_solutions,
-    inverse,
     joint_limits,
     solve_ik,
     tool_pose,
@@ -34,10 +32,6 @@ def drake_pose(model: CollisionModel, arm: Arm, frame: str, q: np.ndarray) -> Ri
     return arm.frame(frame).CalcPoseInWorld(context)
 
 
-def angular_distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.abs(np.angle(np.exp(1j * (a - b)))).max(axis=-1)
-
-
 def test_forward_kinematics_agrees_with_drake(model: CollisionModel) -> None:
     rng = np.random.default_rng(0)
     for name, frame in (("left", "wide"), ("right", "mount")):
@@ -46,44 +40,6 @@ def test_forward_kinematics_agrees_with_drake(model: CollisionModel) -> None:
             X_WT = tool_pose(arm, model.context, arm.frame(frame), q)
             expected = drake_pose(model, arm, frame, q)
             np.testing.assert_allclose(X_WT.GetAsMatrix4(), expected.GetAsMatrix4(), atol=1e-9)
-
-
-def test_every_inverse_solution_reaches_the_pose() -> None:
-    rng = np.random.default_rng(1)
-    for q in rng.uniform(-np.pi, np.pi, (60, 6)):
-        X_BF = flange_pose(q)
-        for solution in inverse(X_BF):
-            assert flange_pose(solution).IsNearlyEqualTo(X_BF, 1e-6)
-
-
-def test_the_angles_that_made_a_pose_are_among_its_solutions() -> None:
-    rng = np.random.default_rng(2)
-    for q in rng.uniform(-np.pi, np.pi, (60, 6)):
-        assert angular_distance(inverse(flange_pose(q)), q).min() < 1e-6
-
-
-def test_solutions_differ_from_each_other() -> None:
-    q = np.deg2rad([10, -100, 80, -60, -80, 20])
-    solutions = inverse(flange_pose(q))
-    assert len(solutions) == 8
-    for i, solution in enumerate(solutions):
-        assert angular_distance(np.delete(solutions, i, axis=0), solution).min() > 0.1
-
-
-def test_aligned_wrist_keeps_the_angle_it_is_given() -> None:
-    """With wrist 2 at zero only the sum of wrist 1 and wrist 3 counts."""
-    q = np.array([0.3, -1.5, 1.2, -0.8, 0.0, 0.4])
-    solutions = inverse(flange_pose(q), wrist_3=0.9)
-    assert len(solutions) > 0
-    exact = [s for s in solutions if abs(s[4]) < 1e-6 and abs(s[5] - 0.9) < 1e-9]
-    assert exact
-    for solution in exact:
-        assert flange_pose(solution).IsNearlyEqualTo(flange_pose(q), 1e-6)
-
-
-def test_too_far_has_no_solution() -> None:
-    assert inverse(RigidTransform([1.2, 0.0, 0.2])).shape == (0, 6)
-    assert inverse(RigidTransform([0.0, 0.0, 0.5])).shape == (0, 6)  # On the axis of the shoulder.
 
 
 @pytest.mark.parametrize(("name", "frame"), [("left", "tip"), ("left", "nose"), ("right", "mount")])

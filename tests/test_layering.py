@@ -9,19 +9,25 @@ ROOT = Path(__file__).resolve().parent.parent
 ALLOWED = {"cell": set(), "planning": {"cell"}, "experiments": {"cell", "planning"}}
 SOURCES = sorted(f for p in [*ALLOWED, "tests"] for f in (ROOT / p).rglob("*.py"))
 # The folders and single files of a package, from the lowest up, each with what it may use of the
-# same package. `errors`, `paths` and `setting` are for all of cell.
+# same package. Some are for all of cell: see `EVERYWHERE`.
 LAYERS: dict[str, dict[str, set[str]]] = {
     "cell": {
         "errors": set(),
         "paths": set(),
         "setting": set(),
+        "forces": set(),
+        "sleep": set(),
+        "monitor": set(),
         "products": set(),
-        "workpieces": {"products"},
         "fixtures": set(),
         "configuration": {"fixtures"},
-        "machines": {"configuration", "workpieces"},
-        "cad": {"products"},
-        "builder": {"configuration", "fixtures", "machines", "products", "workpieces"},
+        "machines": {"configuration", "fixtures"},
+        "workpieces": {"machines", "products"},
+        "ports": {"workpieces"},
+        "cad": {"fixtures", "machines", "products"},
+        "builder": {
+            "configuration", "fixtures", "machines", "monitor", "ports", "products", "workpieces",
+        },
         "simulation": {
             "builder", "configuration", "fixtures", "machines", "products", "workpieces",
         },
@@ -32,19 +38,23 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "ordering": {"feasibility", "fixture_analysis"},
         "assembly_plan": {"feasibility", "fixture_analysis", "ordering"},
         "motion": set(),
-        "operations": {"feasibility", "motion", "assembly_plan"},
+        "perception": set(),
+        "operations": {"feasibility", "motion", "assembly_plan", "perception"},
     },
     "experiments": {
         "reporting": set(),
-        "metrics": set(),
         "jig": set(),
         "plan": {"reporting"},
-        "assembly": {"reporting", "metrics"},
-        "paper": {"reporting", "metrics"},
+        "assembly": {"reporting"},
+        "paper": {"reporting"},
         "cli": {"reporting", "plan", "assembly", "paper"},
     },
 }  # fmt: skip
-EVERYWHERE = {"cell": {"errors", "paths", "setting"}, "planning": set(), "experiments": set()}
+EVERYWHERE = {
+    "cell": {"errors", "paths", "setting", "forces", "sleep"},
+    "planning": set(),
+    "experiments": set(),
+}
 EVERY_LAYER = [(package, layer) for package, layers in LAYERS.items() for layer in layers]
 MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
 

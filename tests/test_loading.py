@@ -1,4 +1,4 @@
-"""Products at the door: units, soundness, and errors that name culprit and alternatives."""
+"""Input validation of products: units, soundness, errors that name culprit and alternatives."""
 
 from pathlib import Path
 
@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import trimesh
 
-from cell.errors import BadOrder, BadPart, CellError, UnknownName
-from cell.products.loading import load_product
+from cell.errors import BadOrder, BadPart, InputError, UnknownName
+from cell.products.loading import load_product, product_names
 from cell.products.mesh_io import MESH_SUFFIXES
 
 GOOD = """
@@ -28,6 +28,21 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
+@pytest.mark.parametrize("name", product_names())
+def test_own_products_can_be_simulated(name: str) -> None:
+    load_product(name).check_simulable()
+
+
+def test_parts_that_cannot_be_simulated_are_named(folder: Path) -> None:
+    """A part of mesh and mass alone, and one with a model but without a place in the tray."""
+    text = GOOD.replace("peg.stl, mass_kg: 0.02", "bolt_m3x10")
+    text = text.replace("mesh: bolt_m3x10", "model: bolt_m3x10")
+    product = load_product(write(folder, text))
+    with pytest.raises(InputError, match="planned, but not assembled") as caught:
+        product.check_simulable()
+    assert "for block: a contact model; for block, peg: a place in the tray" in str(caught.value)
+
+
 def write(folder: Path, text: str) -> Path:
     file = folder / "pair.yaml"
     file.write_text(text)
@@ -40,7 +55,7 @@ def test_motor_unit_is_complete() -> None:
     assert tuple(product.parts) == ("motor", "plate", *bolts)
     assert product.items() == ("motor", "plate", "bolts")
     assert product.orders == (("motor", "plate", "bolts"), ("plate", "bolts", "motor"))
-    assert product.members("bolts") == tuple(product.fasteners) == bolts
+    assert product.members("bolts") == tuple(product.screws) == bolts
     assert (product.up, product.contact_tolerance) == ("+z", pytest.approx(5e-5))
     for part in product.parts.values():
         assert part.mesh.is_volume and part.model and part.X_TrayP and part.grasps
@@ -111,18 +126,18 @@ def test_unknown_product_names_the_nearest() -> None:
 
 def test_unsupported_input_lists_what_is(folder: Path) -> None:
     (folder / "pair.iges").write_text("")
-    with pytest.raises(CellError, match=r"not a product; supported: .*yaml.*folder of meshes"):
+    with pytest.raises(InputError, match=r"not a product; supported: .*yaml.*folder of meshes"):
         load_product(folder / "pair.iges")
-    with pytest.raises(CellError, match="does not exist"):
+    with pytest.raises(InputError, match="does not exist"):
         load_product(folder / "nowhere" / "thing.iges")
-    with pytest.raises(CellError, match="No product file"):
+    with pytest.raises(InputError, match="No product file"):
         load_product(folder / "nowhere" / "thing.step")
 
 
 def test_unknown_unit_lists_the_known(folder: Path) -> None:
     with pytest.raises(UnknownName, match="No unit 'mn'.*cm, in, m, mm"):
         load_product(folder, units="mn")
-    with pytest.raises(CellError, match="states its own units"):
+    with pytest.raises(InputError, match="states its own units"):
         load_product(write(folder, GOOD), units="cm")
 
 
@@ -165,16 +180,16 @@ def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -
         load_product(folder, "mm")
     empty = tmp_path / "empty"
     empty.mkdir()
-    with pytest.raises(CellError, match="no mesh; supported: .obj"):
+    with pytest.raises(InputError, match="no mesh; supported: .obj"):
         load_product(empty)
 
 
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ("mass_kg: 0.1", "mass_kg: -0.1", "'block'.*mass"),
-        ("mass_kg: 0.1", "mass_kg: 0", "'block'.*mass"),
-        ("mass_kg: 0.1", "mass_kg: heavy", "'block'.*mass"),
+        ("mass_kg: 0.1", "mass_kg: -0.1", "parts.block.mass_kg: expected a number"),
+        ("mass_kg: 0.1", "mass_kg: 0", "parts.block.mass_kg: expected a number"),
+        ("mass_kg: 0.1", "mass_kg: heavy", "parts.block.mass_kg: expected a number"),
         ("mass_kg: 0.1", "mas_kg: 0.1", "parts.block.*Did you mean 'mass_kg'"),
         ("mesh: block.stl, ", "", "'block'.*'model' or a 'mesh'"),
         ("mesh: block.stl", "mesh: blok.stl", "'block'.*no mesh file"),
@@ -193,13 +208,14 @@ def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -
         ("parts:", "groups: {both: []}\nparts:", "'both' has no parts"),
         ("peg: {mesh", "1: {mesh", "the key 1 is not a name"),
         ("peg: {mesh", "[a, b]: {mesh", "a key is a name"),
+        ("orders: [[block, peg]]", "orders: {a: b}", "pair.yaml: orders: expected a list"),
         ("parts:", "groups: {peg: [block]}\nparts:", "both a part and a group"),
         ("parts:", "groups: {a: [peg], b: [peg]}\nparts:", "'peg' is in 'a' and 'b'"),
     ],
 )
 def test_malformed_product_is_refused(folder: Path, old: str, new: str, message: str) -> None:
     assert old in GOOD
-    with pytest.raises(CellError, match=message):
+    with pytest.raises(InputError, match=message):
         load_product(write(folder, GOOD.replace(old, new, 1)))
 
 
@@ -215,9 +231,11 @@ def test_malformed_grasp_is_refused(folder: Path) -> None:
         "approach: [1, 0, 1], width_mm: 5, force_N: 4}]"
     )
     text = GOOD.replace("mass_kg: 0.1", f"mass_kg: 0.1, {grasp}")
-    with pytest.raises(CellError, match="block.grasps.0.*not perpendicular"):
+    with pytest.raises(InputError, match="block.grasps.0.*not perpendicular"):
         load_product(write(folder, text))
-    with pytest.raises(UnknownName, match="No jaw 'tipp'"):
-        load_product(write(folder, text.replace("jaw: tip", "jaw: tipp")))
     good = text.replace("approach: [1, 0, 1]", "approach: [0, 0, 1]")
+    with pytest.raises(UnknownName, match="No jaw 'tipp'"):
+        load_product(write(folder, good.replace("jaw: tip", "jaw: tipp")))
+    with pytest.raises(InputError, match="grasps.0..closing: the zero vector"):
+        load_product(write(folder, good.replace("closing: [1, 0, 0]", "closing: [0, 0, 0]")))
     assert load_product(write(folder, good)).parts["block"].grasps[0].force == 4.0

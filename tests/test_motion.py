@@ -8,7 +8,8 @@ from planning_cell import P_WJ, TOOL_DOWN, planning_cell
 from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.tree import SpatialInertia
 
-from cell.errors import UnknownName
+from cell.errors import RunFailure, UnknownName
+from cell.machines.arms import ARM_MODELS, ArmModel
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
 from planning.motion.kinematics import solve_ik, tool_pose
@@ -264,3 +265,38 @@ def test_standing_still_takes_no_time(model: CollisionModel) -> None:
     motion = timed(model, path)
     assert motion.duration == 0.0
     np.testing.assert_array_equal(motion.at(0.0)[0], home)
+
+
+@pytest.mark.parametrize("kind", ARM_MODELS.values(), ids=lambda arm: arm.name)
+@pytest.mark.parametrize("gripper", ["hand_e", "gripper_85"])
+def test_every_arm_with_every_gripper_plans_and_times_its_way(kind: ArmModel, gripper: str) -> None:
+    """Sideways around, then straight down, from where it waits."""
+    model = planning_cell(kind, gripper)
+    arm = model.arms["left"]
+    tip = arm.frame("tip")
+    assert model.is_free("left", arm.home), model.collisions("left", arm.home)
+    X_WHome = tool_pose(arm, model.context, tip, arm.home)
+    X_WOver = RigidTransform(X_WHome.rotation(), X_WHome.translation() + [0.0, 0.15, 0.0])
+    q_over = solve_ik(
+        arm,
+        model.context,
+        tip,
+        X_WOver,
+        near=arm.home,
+        is_free=lambda q: arm.model.is_regular(q) and model.is_free("left", q),
+    )
+    assert np.abs(q_over - arm.home).max() < 1.0
+    path = plan_path(model, "left", arm.home, q_over, seed=0, max_iterations=1000)
+    down = RigidTransform(X_WHome.rotation(), X_WOver.translation() - [0.0, 0.0, 0.05])
+    line = plan_line(arm, model.context, tip, q_over, down)
+    assert tool_pose(arm, model.context, tip, line.waypoints[-1]).IsNearlyEqualTo(down, 1e-6)
+    speed = SPEED * np.array([link.speed for link in kind.links])
+    for motion in (timed(model, path), timed(model, line)):
+        assert motion.q.shape[1] == kind.dof
+        assert (np.abs(motion.v) <= speed * 1.01).all()
+
+
+def test_failures_are_failures_of_the_run(model: CollisionModel) -> None:
+    arm = model.arms["left"]
+    with pytest.raises(RunFailure):
+        plan_line(arm, model.context, arm.frame("tip"), arm.home, RigidTransform([0, 0, 9.0]))

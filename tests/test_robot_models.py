@@ -15,17 +15,21 @@ from pydrake.systems.framework import Diagram, DiagramBuilder
 from solids import assert_same_solid
 
 from cell.cad import robots, workcell
+from cell.errors import UnknownName
+from cell.machines.arms import ARM_MODELS
+from cell.machines.grippers import GRIPPER_MODELS, HAND_E, GripperModel, gripper_model
 from cell.paths import MODELS, model_url, new_parser
 
 NAMES = (
-    "ur5e",
-    "hand_e",
+    *ARM_MODELS,
+    *GRIPPER_MODELS,
     "screwdriver",
     "table",
     "riser",
     "force_plate",
     "jig_base",
 )
+GRIPPERS = pytest.mark.parametrize("gripper", GRIPPER_MODELS.values(), ids=lambda g: g.name)
 # Denavit-Hartenberg parameters of the UR5e published by its maker.
 A = [0, -0.425, -0.3922, 0, 0, 0]
 D = [0.1625, 0, 0, 0.1333, 0.0997, 0.0996]
@@ -134,27 +138,26 @@ def test_arm_shapes_touch_as_points(arm: tuple[Diagram, MultibodyPlant]) -> None
         )
 
 
-def test_jaw_frames_are_where_the_grasps_expect_them() -> None:
-    diagram, plant, _ = load("hand_e", "mount")
+@GRIPPERS
+def test_jaw_frames_are_where_the_grasps_expect_them(gripper: GripperModel) -> None:
+    _, plant, _ = load(gripper.sdf, gripper.mount_frame)
     context = plant.CreateDefaultContext()
+    z = gripper.tip_z
     for name, p_MJaw in {
-        "tip": [0, 0, 0.175],
-        "wide": [0, 0.022, 0.175],
-        "nose": [0, 0, 0.1975],
+        "tip": [0, 0, z],
+        "wide": [0, 0.022, z],
+        "nose": [0, 0, z + 0.0225],
     }.items():
         X_MJaw = plant.GetFrameByName(name).CalcPoseInWorld(context)
         assert X_MJaw.IsNearlyEqualTo(RigidTransform(p_MJaw), 1e-12), name
 
 
-@pytest.mark.parametrize(
-    ("pad", "frame", "offset"),
-    [("pad_tip", "tip", 0.0), ("pad_nose", "nose", 0.0), ("pad_wide", "wide", 0.012)],
-)
-def test_jaw_faces_stand_half_the_opening_from_the_frame(
-    pad: str, frame: str, offset: float
-) -> None:
-    """Each finger travels s/2, so the inner faces are at +-(s/2 + offset), centred laterally."""
-    diagram, plant, _ = load("hand_e", "mount")
+@GRIPPERS
+@pytest.mark.parametrize("frame", ["tip", "nose", "wide"])
+def test_jaw_faces_stand_half_the_opening_from_the_frame(gripper: GripperModel, frame: str) -> None:
+    """Each finger travels s/2, so the faces are at +-(s + setback)/2, centred laterally."""
+    diagram, plant, _ = load(gripper.sdf, gripper.mount_frame)
+    pad, offset = f"pad_{frame}", gripper.setback[frame] / 2
     context = diagram.CreateDefaultContext()
     mine = plant.GetMyMutableContextFromRoot(context)
     inspector = diagram.GetSubsystemByName("scene_graph").model_inspector()
@@ -176,8 +179,9 @@ def _model(plant: MultibodyPlant) -> str:
     return plant.GetModelInstanceName(plant.GetBodyByName("palm").model_instance())
 
 
-def test_only_pads_are_hydroelastic() -> None:
-    diagram, _, _ = load("hand_e", "mount")
+@GRIPPERS
+def test_only_pads_are_hydroelastic(gripper: GripperModel) -> None:
+    diagram, _, _ = load(gripper.sdf, gripper.mount_frame)
     inspector = diagram.GetSubsystemByName("scene_graph").model_inspector()
     soft = {
         inspector.GetName(shape).split("::")[-1]
@@ -187,10 +191,14 @@ def test_only_pads_are_hydroelastic() -> None:
     assert soft == {"pad_tip", "pad_wide", "pad_nose"}
 
 
-def test_one_drive_moves_both_fingers_apart() -> None:
-    _, plant, _ = load("hand_e", "mount")
+@GRIPPERS
+def test_one_drive_moves_both_fingers_apart(gripper: GripperModel) -> None:
+    _, plant, _ = load(gripper.sdf, gripper.mount_frame)
     assert plant.num_actuators() == 1
-    assert plant.GetEffortUpperLimits().tolist() == [130.0]
+    assert plant.GetEffortUpperLimits().tolist() == [gripper.effort]
+    drive = plant.GetJointByName(gripper.drive_joint)
+    assert drive.position_upper_limits()[0] == pytest.approx(gripper.stroke / 2)
+    assert drive.velocity_upper_limits()[0] == pytest.approx(gripper.speed)
     assert plant.num_constraints() == 1
     context = plant.CreateDefaultContext()
     plant.SetPositions(context, [0.01, 0.01])
@@ -199,6 +207,25 @@ def test_one_drive_moves_both_fingers_apart() -> None:
         for side in ("left", "right")
     )
     np.testing.assert_allclose(left - right, [0.02, 0, 0], atol=1e-12)
+
+
+@GRIPPERS
+def test_gripper_weighs_what_its_maker_says_and_its_fingertips(gripper: GripperModel) -> None:
+    _, plant, instance = load(gripper.sdf, gripper.mount_frame)
+    for index in plant.GetBodyIndices(instance):
+        assert plant.get_body(index).default_spatial_inertia().IsPhysicallyValid()
+    steel_tips = 2 * 0.063  # [kg] Of both fingers.
+    published = gripper.palm_mass + 2 * gripper.finger_mass
+    total = plant.CalcTotalMass(plant.CreateDefaultContext())
+    assert total == pytest.approx(published + steel_tips, abs=1e-3)
+
+
+def test_grippers_have_the_published_strokes() -> None:
+    strokes = {name: model.stroke for name, model in GRIPPER_MODELS.items()}
+    assert strokes == pytest.approx({"hand_e": 0.050, "gripper_85": 0.085})
+    assert HAND_E.setback == pytest.approx({"tip": 0.0, "nose": 0.0, "wide": 0.024})
+    with pytest.raises(UnknownName, match="No gripper model 'hande'.*Did you mean 'hand_e'"):
+        gripper_model("hande")
 
 
 def test_bit_turns_about_the_tool_axis_and_ends_280_mm_from_the_mount() -> None:
@@ -284,8 +311,9 @@ def _room_for_shaft(query: QueryObject, p_BoltShaft: np.ndarray, closing: float)
     )
 
 
-def test_planned_neighbours_of_the_hand_are_filtered() -> None:
+@GRIPPERS
+def test_planned_neighbours_of_the_hand_are_filtered(gripper: GripperModel) -> None:
     """Fingers meet at their pads when closed: that is a stop, not a contact."""
-    diagram, plant, _ = load("hand_e", "mount")
+    diagram, plant, _ = load(gripper.sdf, gripper.mount_frame)
     query = _query(diagram, plant)
     assert not query.ComputePointPairPenetration()

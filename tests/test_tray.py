@@ -76,16 +76,16 @@ def test_part_stays_where_the_tray_presents_it(product: str, names: list[str]) -
 @pytest.mark.parametrize("product", PRODUCTS)
 def test_bolts_hang_free_in_what_is_set_aside_in_the_tray(product: str) -> None:
     """The place is open below: let go 0.3 mm above, every bolt comes to rest on its head."""
-    parts, fasteners = PRODUCTS[product].parts, PRODUCTS[product].fasteners
+    parts, screws = PRODUCTS[product].parts, PRODUCTS[product].screws
     clamped = parts[CLAMPED[product]]
     assert clamped.X_TrayP is not None
     X_TA = clamped.X_TrayP @ clamped.X_AP.inverse()
     dropped = RigidTransform([0.0, 0.0, 3e-4])
     X_TP = {clamped.name: clamped.X_TrayP}
-    X_TP |= {bolt: dropped @ X_TA @ parts[bolt].X_AP for bolt in fasteners}
+    X_TP |= {bolt: dropped @ X_TA @ parts[bolt].X_AP for bolt in screws}
     X_TP_end = settle(PRODUCTS[product], 0.5, X_TP)
     X_TA = X_TP_end[clamped.name] @ clamped.X_AP.inverse()
-    for bolt in fasteners:
+    for bolt in screws:
         X_SeatF = (X_TA @ parts[bolt].X_AP).InvertAndCompose(X_TP_end[bolt])
         assert abs(X_SeatF.translation()[2]) < 5e-5
         assert np.hypot(*X_SeatF.translation()[:2]) < 3e-4

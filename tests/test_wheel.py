@@ -13,7 +13,7 @@ SOURCES = ("cell", "planning", "experiments", "models", "pyproject.toml", "READM
 
 
 @pytest.mark.slow
-def test_wheel_carries_every_model_file_and_no_tests(tmp_path: Path) -> None:
+def test_wheel_carries_every_data_file_and_no_tests(tmp_path: Path) -> None:
     """Built from a copy: setuptools leaves its build folder beside the sources."""
     for name in SOURCES:
         copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy
@@ -24,6 +24,8 @@ def test_wheel_carries_every_model_file_and_no_tests(tmp_path: Path) -> None:
     packed = set(zipfile.ZipFile(wheel).namelist())
     models = {p.relative_to(ROOT).as_posix() for p in (ROOT / "models").rglob("*") if p.is_file()}
     assert models <= packed
-    assert "experiments/reporting/report.css" in packed
-    assert "experiments/jig/element_reference.yaml" in packed
+    for package in ("cell", "planning", "experiments"):
+        files = (p for p in (ROOT / package).rglob("*") if p.is_file() and p.suffix != ".pyc")
+        assert {p.relative_to(ROOT).as_posix() for p in files} <= packed
+        assert f"{package}/py.typed" in packed
     assert not any(name.startswith("tests/") for name in packed)

@@ -9,7 +9,8 @@ import trimesh
 from manifold3d import Manifold
 from pydrake.math import RigidTransform
 
-from cell.products.product import Fastener, Part, Product
+from cell.products.joints import Screw
+from cell.products.product import Part, Product
 
 MM = 1e-3
 
@@ -64,9 +65,9 @@ def bolted(thread: float = 3.0) -> Product:
     base = box((30, 30, 20), (-15, -15, -20)) - rod(thread, -10, 5, 32)
     lid = box((30, 30, 5), (-15, -15, 0)) - rod(3.4, -5, 10, 32)
     bolt = rod(3, -5, 6, 32) + rod(5.5, 5, 8, 32)
-    fastener = Fastener("bolt", "base", "lid", "M3", 3e-3, 5e-4, 5e-3, 0.5, 0.2)
+    screw = Screw("bolt", "base", "lid", "M3", 3e-3, 5e-4, 5e-3, 0.5, 0.2)
     shapes = {"base": base, "lid": lid, "bolt": bolt}
-    return product_of(shapes, fasteners={"bolt": fastener}, orders=(("base", "lid", "bolt"),))
+    return product_of(shapes, joints=(screw,), orders=(("base", "lid", "bolt"),))
 
 
 def tube_and_pins() -> Product:

@@ -1,13 +1,28 @@
-"""SDF models of everything that moves by itself: arm, gripper, driver."""
+"""SDF models of everything that moves by itself: arms, grippers, driver."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from pathlib import Path
 
-from cell.cad import hand_e, screwdriver, ur5e
+from cell.cad.gripper_85 import gripper_85
+from cell.cad.hand_e import hand_e
+from cell.cad.screwdriver import screwdriver
+from cell.cad.sdf_model import SdfModel
+from cell.cad.seven_axis import seven_axis
+from cell.cad.ur import ur
+from cell.machines.arms.seven_axis import IIWA14
+from cell.machines.arms.ur import UR3E, UR5E, UR10E
+
+
+def robot_models() -> Iterator[SdfModel]:
+    """Yield every arm, gripper and driver."""
+    yield from map(ur, (UR3E, UR5E, UR10E))
+    yield seven_axis(IIWA14)
+    yield from (hand_e(), gripper_85(), screwdriver())
 
 
 def write_models(folder: Path) -> None:
-    """Write ur5e, hand_e and screwdriver into ``folder`` (models/sdf)."""
-    for module in (ur5e, hand_e, screwdriver):
-        module.write_models(folder)
+    """Write every arm, gripper and driver into ``folder`` (models/sdf)."""
+    for model in robot_models():
+        model.write(folder)

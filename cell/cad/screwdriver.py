@@ -13,7 +13,6 @@ hex size 2.5 mm for M3 [R ISO 4762]. All lengths in metres.
 from __future__ import annotations
 
 import math
-from pathlib import Path
 
 import trimesh
 
@@ -162,8 +161,3 @@ def _add_floats(model: SdfModel) -> str:
         )
         parent = link
     return parent
-
-
-def write_models(folder: Path) -> None:
-    """Write the driver into ``folder``/screwdriver."""
-    screwdriver().write(folder)

@@ -26,6 +26,15 @@ from cell.cad.sdf_model import (
     cylinder,
     rounded_cylinder,
 )
+from cell.fixtures.jig_dimensions import (
+    APERTURE_DIAMETER,
+    BASE_DIAMETER,
+    BASE_HEIGHT,
+    BEAD_MASS,
+    J_HEIGHT,
+    JIG_MASS,
+    SCREW_CIRCLE_RADIUS,
+)
 
 ALUMINIUM: Color = (0.66, 0.67, 0.69)
 PROFILE: Color = (0.50, 0.52, 0.54)
@@ -37,12 +46,8 @@ CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 TABLE_SIZE = (1.8, 1.2, 0.05)  # [A]
 TABLE_HEIGHT = 0.75  # Above the floor; only seen [A].
 FORCE_PLATE_SIZE = (0.30, 0.30, 0.035)  # [A] a common size.
-JIG_DIAMETER, JIG_HEIGHT = 0.160, 0.025  # Diameter [S]; height [A].
-APERTURE_DIAMETER = 0.1166  # [D] of a cap with R = 60 mm that holds 296 cm3 [S].
-JIG_BASE_MASS = 1.05  # [A] 1.5 kg for the whole jig, less 0.45 kg of beads [S].
 RIM_HEIGHT = 0.006  # [A]
-J_HEIGHT = 0.20  # [A] of J above the table: in the reach of both arms.
-FORCE_PLATE_TOP = -JIG_HEIGHT  # In J.
+FORCE_PLATE_TOP = -BASE_HEIGHT  # In J.
 RISER_TOP = FORCE_PLATE_TOP - FORCE_PLATE_SIZE[2]
 RISER_SIZE = (0.26, 0.26, J_HEIGHT + RISER_TOP)
 
@@ -107,26 +112,26 @@ def jig_base() -> SdfModel:
     The clamping rim and its four screws at 90 deg [S] are seen only: nothing reaches them but the
     bag, which the soft jig itself describes.
     """
-    radius, aperture = JIG_DIAMETER / 2, APERTURE_DIAMETER / 2
+    radius, aperture = BASE_DIAMETER / 2, APERTURE_DIAMETER / 2
     model = SdfModel("jig_base")
-    inertia = Inertia.of_cylinder(JIG_BASE_MASS, radius, JIG_HEIGHT, (0, 0, -JIG_HEIGHT / 2))
-    model.link("jig_base", inertia)
-    body = model.mesh("body", rounded_cylinder(radius, JIG_HEIGHT - RIM_HEIGHT, 0.0005))
-    model.visual("jig_base", "body", body, DARK, Pose(z=-JIG_HEIGHT))
+    mass, middle = JIG_MASS - BEAD_MASS, (0, 0, -BASE_HEIGHT / 2)
+    model.link("jig_base", Inertia.of_cylinder(mass, radius, BASE_HEIGHT, middle))
+    body = model.mesh("body", rounded_cylinder(radius, BASE_HEIGHT - RIM_HEIGHT, 0.0005))
+    model.visual("jig_base", "body", body, DARK, Pose(z=-BASE_HEIGHT))
     floor = cylinder(aperture, RIM_HEIGHT - 0.0005)
     model.visual("jig_base", "floor", floor, DARK, Pose(z=-RIM_HEIGHT / 2 - 0.00025))
     rim = trimesh.creation.annulus(aperture, radius, RIM_HEIGHT, sections=96)
     model.visual("jig_base", "rim", model.mesh("rim", rim), ALUMINIUM, Pose(z=-RIM_HEIGHT / 2))
     for i in range(4):
-        angle, r = math.pi / 4 + i * math.pi / 2, (radius + aperture) / 2
+        angle, r = math.pi / 4 + i * math.pi / 2, SCREW_CIRCLE_RADIUS
         x, y = r * math.cos(angle), r * math.sin(angle)
         model.visual("jig_base", f"screw_{i}", cylinder(0.0045, 0.001), STEEL, Pose(x, y, 0))
         model.visual("jig_base", f"socket_{i}", cylinder(0.002, 0.0012), DARK, Pose(x, y, 0))
     port = cylinder(0.005, 0.03)
-    side = Pose(x=-radius - 0.01, z=-JIG_HEIGHT / 2 - 0.003, pitch=math.pi / 2)
+    side = Pose(x=-radius - 0.01, z=-BASE_HEIGHT / 2 - 0.003, pitch=math.pi / 2)
     model.visual("jig_base", "vacuum_port", port, STEEL, side)
-    hull = cylinder(radius, JIG_HEIGHT)
-    model.collision("jig_base", "base", hull, JIG_CONTACT, Pose(z=-JIG_HEIGHT / 2))
+    hull = cylinder(radius, BASE_HEIGHT)
+    model.collision("jig_base", "base", hull, JIG_CONTACT, Pose(z=-BASE_HEIGHT / 2))
     return model
 
 

@@ -1,62 +1,66 @@
-"""The commented default configuration file, written from the settings in the code.
-
-``python -m cell.configuration.config_yaml`` writes ``models/config/default.yaml``.
-"""
+"""The commented default configuration file, written from the settings in the code."""
 
 from __future__ import annotations
 
-from dataclasses import fields, is_dataclass
+import textwrap
+from collections.abc import Mapping
 from typing import Any
 
 import yaml
 
 from cell.configuration.config import CellConfig
-from cell.configuration.config_file import CONFIG_FOLDER, setting_of
+from cell.configuration.sections import children, is_section, setting_of
 from cell.setting import Setting
 
 HEADER = """\
 # The default configuration, written by `make models` from the settings in the code.
 # Copy it, keep only what you change, and pass the copy with --config; or change single values
 # with --set, for example --set simulation.time_step=0.002.
+# Above each value: [unit | valid] what it is; below that, where it comes from: [S] the paper,
+# [R] read in the source named, [M] measured, [D] derived, [A] assumption. "DEM" is the project's
+# discrete-element reference run with glass beads in a dome of the same size.
 """
+WIDTH = 100
 
 
-def commented_yaml(section: Any, indent: str = "") -> str:
-    """Return a section as YAML, each value with its unit, range and meaning as a comment."""
+def default_yaml() -> str:
+    """Return the content of ``models/config/default.yaml``."""
+    return "\n".join([*HEADER.splitlines(), *_lines(CellConfig(), "")]) + "\n"
+
+
+def summary(section: Any) -> str:
+    """Return what a section is about: the first line of its class's docstring."""
+    return "" if isinstance(section, Mapping) else (type(section).__doc__ or "").splitlines()[0]
+
+
+def value_text(value: Any) -> str:
+    """Return a value as YAML on one line."""
+    plain = list(value) if isinstance(value, tuple) else value
+    text = yaml.safe_dump(plain, default_flow_style=True, width=1000)
+    return text.removesuffix("...\n").strip()
+
+
+def _lines(section: Any, indent: str) -> list[str]:
     lines = []
-    for info in fields(section):
-        value = getattr(section, info.name)
-        if is_dataclass(value):
-            summary = (type(value).__doc__ or "").splitlines()[0]
-            lines += ["", f"{indent}# {summary}", f"{indent}{info.name}:"]
-            lines.append(commented_yaml(value, indent + "  "))
+    for key, value in children(section).items():
+        if is_section(value):
+            about = summary(value)
+            lines += ["", *([f"{indent}# {about}"] if about else []), f"{indent}{key}:"]
+            lines += _lines(value, indent + "  ")
         else:
-            about = setting_of(section, info)
-            text = yaml.safe_dump(
-                list(value) if isinstance(value, tuple) else value,
-                default_flow_style=True, width=1000,
-            )  # fmt: skip
-            text = text.removesuffix("...\n").strip()
-            if comment := _comment(about):
-                lines.append(f"{indent}# {comment}")
-            lines.append(f"{indent}{info.name}: {text}")
-    return "\n".join(lines)
+            lines += _comment(setting_of(section, key), indent)
+            lines.append(f"{indent}{key}: {value_text(value)}")
+    return lines
 
 
-def _comment(about: Setting) -> str:
-    limits = " | ".join(about.choices) or about.range_text()
-    if limits == about.unit:
-        limits = ""
-    unit = f"[{about.unit}] " if about.unit else ""
-    return f"{unit}{about.meaning}" + (f" Valid: {limits}." if limits else "")
-
-
-def main() -> None:
-    """Write ``models/config/default.yaml``."""
-    CONFIG_FOLDER.mkdir(exist_ok=True)
-    text = f"{HEADER}{commented_yaml(CellConfig())}\n"
-    (CONFIG_FOLDER / "default.yaml").write_text(text, encoding="utf-8")
-
-
-if __name__ == "__main__":
-    main()
+def _comment(info: Setting, indent: str) -> list[str]:
+    """Return meaning, unit, range and source as comment lines."""
+    facts = [info.unit, info.range_text()]
+    known = f"[{' | '.join(fact for fact in facts if fact)}] " if any(facts) else ""
+    start = f"{indent}# "
+    return [
+        *textwrap.wrap(f"{known}{info.meaning}", WIDTH, initial_indent=start,
+                       subsequent_indent=f"{start}  "),
+        *textwrap.wrap(info.source, WIDTH, initial_indent=f"{start}  ",
+                       subsequent_indent=f"{start}  "),
+    ]  # fmt: skip

@@ -8,183 +8,217 @@ and its tool is taken to be compensated exactly, as the controllers of such arms
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
     JacobianWrtVariable,
     JointActuator,
     ModelInstanceIndex,
-    PdControllerGains,
     RevoluteJoint,
-    WeldJoint,
 )
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 
 from cell.configuration.config import ArmConfig
+from cell.errors import InputError
+from cell.machines.arms import ArmModel
+from cell.machines.drive import ArmDrive, NamedPorts
+from cell.machines.driver import Driver
+from cell.machines.gripper import Gripper
+from cell.machines.sensors import WrenchSensor
 from cell.paths import model_url, new_parser
 
-JOINTS = (
-    "shoulder_pan_joint",
-    "shoulder_lift_joint",
-    "elbow_joint",
-    "wrist_1_joint",
-    "wrist_2_joint",
-    "wrist_3_joint",
-)
 # Joint friction that stays when the position drive is off [N m s/rad]; [A], below 1 % of a
 # UR5e wrist joint's torque at working speed.
 TORQUE_MODE_DAMPING = 0.3
 
-
-def constant_source(builder: DiagramBuilder, name: str, value: np.ndarray) -> ConstantVectorSource:
-    """Add a source whose value lives in the Context, so that a save of the Context holds it."""
-    return builder.AddNamedSystem(name, ConstantVectorSource(value))
-
-
-@dataclass(frozen=True)
-class Drive:
-    """The inputs of one model instance: desired state [q; v] and feed-forward effort."""
-
-    plant: MultibodyPlant
-    instance: ModelInstanceIndex
-    target: ConstantVectorSource
-    effort: ConstantVectorSource
-
-    @staticmethod
-    def connect(
-        builder: DiagramBuilder,
-        plant: MultibodyPlant,
-        instance: ModelInstanceIndex,
-        q_home: np.ndarray,
-    ) -> Drive:
-        """Connect both inputs to sources that hold ``q_home`` (n,) until told otherwise."""
-        name = plant.GetModelInstanceName(instance)
-        state = np.concatenate([q_home, np.zeros_like(q_home)])
-        target = constant_source(builder, f"{name}_target", state)
-        effort = constant_source(builder, f"{name}_effort", np.zeros_like(q_home))
-        builder.Connect(target.get_output_port(), plant.get_desired_state_input_port(instance))
-        builder.Connect(effort.get_output_port(), plant.get_actuation_input_port(instance))
-        return Drive(plant, instance, target, effort)
-
-    def set_target(self, root: Context, q: np.ndarray, v: np.ndarray) -> None:
-        """Command the desired positions and velocities of the actuated joints."""
-        context = self.target.GetMyMutableContextFromRoot(root)
-        self.target.get_mutable_source_value(context).SetFromVector(np.concatenate([q, v]))
-
-    def set_effort(self, root: Context, effort: np.ndarray) -> None:
-        """Command the feed-forward effort of the actuated joints."""
-        context = self.effort.GetMyMutableContextFromRoot(root)
-        self.effort.get_mutable_source_value(context).SetFromVector(effort)
-
-    def values(self, root: Context) -> tuple[np.ndarray, np.ndarray]:
-        """Return the commanded state and effort."""
-        target = self.target.get_source_value(self.target.GetMyContextFromRoot(root))
-        effort = self.effort.get_source_value(self.effort.GetMyContextFromRoot(root))
-        return target.get_value().copy(), effort.get_value().copy()
+Tool = Gripper | Driver
 
 
 @dataclass(frozen=True)
 class Arm:
-    """A six-joint arm with a tool on its flange.
+    """An arm with a tool on its flange.
 
     Attributes:
-        name: "left" or "right".
+        name: For example "left".
         plant: The plant it lives in.
         instance: Model instance of the arm (without tool).
-        tool: Model instance of the tool.
+        tool: What it carries.
         joints: From base to flange.
         actuators: In the order of ``joints``.
-        wrist: The weld between flange and tool: where the wrist wrench is read.
-        config: Gains and home configuration.
+        wrist: Force-torque sensor between flange and tool.
+        config: Where it stands, gains and home configuration.
+        model: Its type: kinematics, limits.
+        drive: What the joints are told.
     """
 
     name: str
     plant: MultibodyPlant
     instance: ModelInstanceIndex
-    tool: ModelInstanceIndex
+    tool: Tool
     joints: tuple[RevoluteJoint, ...]
     actuators: tuple[JointActuator, ...]
-    wrist: WeldJoint
+    wrist: WrenchSensor
     config: ArmConfig
+    model: ArmModel
+    drive: ArmDrive
+
+    @property
+    def dof(self) -> int:
+        """Number of joints."""
+        return self.model.dof
 
     @property
     def home(self) -> np.ndarray:
-        """Home configuration (6,) [rad]."""
-        return np.deg2rad(self.config.home_deg)
+        """Home configuration (n,) [rad]."""
+        return home_of(self.model, self.config, self.tool.role)
 
     @property
     def effort_limits(self) -> np.ndarray:
-        """Torque limits (6,) [N m]."""
+        """Torque limits (n,) [N m]."""
         return np.array([actuator.effort_limit() for actuator in self.actuators])
+
+    @property
+    def tool_instance(self) -> ModelInstanceIndex:
+        """Model instance of the tool."""
+        return self.tool.instance
 
     def frame(self, name: str) -> Frame:
         """Return a frame of the tool, for example "tip" or "bit_tip"."""
-        return self.plant.GetFrameByName(name, self.tool)
+        return self.plant.GetFrameByName(name, self.tool.instance)
 
     def positions(self, plant_context: Context) -> np.ndarray:
-        """Return the joint angles (6,) [rad]."""
+        """Return the joint angles (n,) [rad]."""
         return self.plant.GetPositions(plant_context, self.instance)
 
     def velocities(self, plant_context: Context) -> np.ndarray:
-        """Return the joint rates (6,) [rad/s]."""
+        """Return the joint rates (n,) [rad/s]."""
         return self.plant.GetVelocities(plant_context, self.instance)
 
     def jacobian(self, plant_context: Context, frame: Frame, p_FoC: np.ndarray) -> np.ndarray:
-        """Return J (6, 6) with V_WC = J v, for the point C of F; angular rows first, in W."""
+        """Return J (6, n) with V_WC = J v, for the point C of F; angular rows first, in W."""
         world = self.plant.world_frame()
         jacobian = self.plant.CalcJacobianSpatialVelocity(
             plant_context, JacobianWrtVariable.kV, frame, p_FoC, world, world
         )
         start = self.joints[0].velocity_start()
-        return jacobian[:, start : start + len(JOINTS)]
+        return jacobian[:, start : start + self.dof]
 
-    def use_position_drive(self) -> None:
-        """Follow the commanded joint state stiffly."""
-        for actuator, p, d in zip(
-            self.actuators, self.config.stiffness, self.config.damping, strict=True
-        ):
-            actuator.set_controller_gains(PdControllerGains(p=p, d=d))
+    def connect(self, builder: DiagramBuilder, prefix: str) -> NamedPorts:
+        """Connect arm, tool and wrist sensor to the finalized plant.
 
-    def use_torque_drive(self) -> None:
-        """Follow the commanded joint torque; the desired state is ignored but for damping."""
-        for actuator in self.actuators:
-            actuator.set_controller_gains(PdControllerGains(p=0.0, d=TORQUE_MODE_DAMPING))
+        Args:
+            builder: Holds the drives already.
+            prefix: Of the names of systems in the diagram.
 
-    def in_torque_drive(self) -> bool:
-        """Return whether the torque drive is on."""
-        return self.actuators[0].get_controller_gains().p == 0.0
+        Returns:
+            Inputs and outputs by name: "left.torque", "left_gripper.opening" ...
+        """
+        self.drive.connect(builder, self.plant, self.instance)
+        wrench = self.wrist.connect(builder, f"{prefix}{self.name}_wrist")
+        inputs, outputs = self.tool.connect(builder, prefix)
+        inputs = {f"{self.tool.name}.{name}": port for name, port in inputs.items()}
+        outputs = {f"{self.tool.name}.{name}": port for name, port in outputs.items()}
+        for name in ("desired_state", "torque"):
+            inputs[f"{self.name}.{name}"] = self.drive.GetInputPort(name)
+        return inputs, outputs | {f"{self.name}.wrench": wrench}
+
+    def hold_here(self, root: Context) -> None:
+        """Switch to the position drive, with the target where the arm is."""
+        n = self.dof
+        self.drive.use_torque(root, False)
+        self.drive.set_effort(root, np.zeros(n))
+        q = self.positions(self.plant.GetMyContextFromRoot(root))
+        self.drive.set_target(root, q, np.zeros(n))
 
 
-def add_arm(plant: MultibodyPlant, name: str, tool_model: str, config: ArmConfig) -> Arm:
-    """Add a UR5e with a tool to the plant, before it is finalized.
+def home_of(model: ArmModel, config: ArmConfig, role: str) -> np.ndarray:
+    """Return the joint angles (n,) in which an arm with a tool of a role waits [rad]."""
+    own = (config.home_pan_deg, *model.home_deg[role][1:])
+    return np.deg2rad(_per_joint(model, "home_deg", config.home_deg, own))
+
+
+def _per_joint(
+    model: ArmModel, key: str, given: Sequence[float], own: Sequence[float]
+) -> Sequence[float]:
+    """Return what the configuration gives per joint, or else the model's own.
+
+    Raises:
+        InputError: Another number of joints.
+    """
+    if given and len(given) != model.dof:
+        raise InputError(
+            f"'{key}' of an arm has {len(given)} numbers; arm model '{model.name}' has "
+            f"{model.dof} joints. Leave it empty for the model's own."
+        )
+    return given or own
+
+
+def arm_drive(model: ArmModel, config: ArmConfig, role: str, time_step: float) -> ArmDrive:
+    """Return the drive of an arm, which goes into the diagram before the plant.
+
+    Args:
+        model: Type of the arm.
+        config: Of the arm.
+        role: Of its tool: "gripper" or "driver".
+        time_step: Of the plant [s].
+    """
+    stiffness = _per_joint(model, "stiffness", config.stiffness, model.stiffness)
+    damping = _per_joint(model, "damping", config.damping, model.damping)
+    gains = list(zip(stiffness, damping, strict=True))
+    return ArmDrive(home_of(model, config, role), gains, TORQUE_MODE_DAMPING, time_step)
+
+
+def add_arm(
+    plant: MultibodyPlant,
+    name: str,
+    model: ArmModel,
+    config: ArmConfig,
+    drive: ArmDrive,
+    tool_model: str,
+    add_tool: Callable[[ModelInstanceIndex], Tool],
+) -> Arm:
+    """Add an arm with a tool to the plant, before it is finalized.
 
     Args:
         plant: Not finalized yet.
-        name: "left" or "right"; the instances become ``<name>_arm`` and ``<name>_tool``.
-        tool_model: Name of the SDF model of the tool; its frame ``mount`` meets the flange.
+        name: For example "left"; the instances become ``<name>_arm`` and ``<name>_tool``.
+        model: Type of the arm.
         config: Pose of the base, gains and home configuration.
+        drive: From `arm_drive`.
+        tool_model: Name of the SDF model of the tool; its frame ``mount`` meets the flange.
+        add_tool: Makes the handle of the tool from its model instance.
     """
     parser = new_parser(plant)
-    (instance,) = parser.AddModelsFromUrl(model_url("ur5e"))
+    (instance,) = parser.AddModelsFromUrl(model_url(model.sdf))
     (tool,) = parser.AddModelsFromUrl(model_url(tool_model))
     plant.RenameModelInstance(instance, f"{name}_arm")
     plant.RenameModelInstance(tool, f"{name}_tool")
-    X_WB: RigidTransform = config.X_WB
-    plant.WeldFrames(plant.world_frame(), plant.GetFrameByName("base_link", instance), X_WB)
+    base = plant.GetFrameByName(model.base_frame, instance)
+    plant.WeldFrames(plant.world_frame(), base, config.X_WB)
     wrist = plant.WeldFrames(
-        plant.GetFrameByName("flange", instance), plant.GetFrameByName("mount", tool)
+        plant.GetFrameByName(model.flange_frame, instance), plant.GetFrameByName("mount", tool)
     )
     plant.set_gravity_enabled(instance, False)
     plant.set_gravity_enabled(tool, False)
-    joints = tuple(plant.GetJointByName(joint, instance) for joint in JOINTS)
-    actuators = tuple(plant.GetJointActuatorByName(joint, instance) for joint in JOINTS)
-    arm = Arm(name, plant, instance, tool, joints, actuators, wrist, config)
-    arm.use_position_drive()
+    joints = tuple(plant.GetJointByName(joint, instance) for joint in model.joints)
+    actuators = tuple(plant.GetJointActuatorByName(joint, instance) for joint in model.joints)
+    drive.drive(actuators)
+    arm = Arm(
+        name=name,
+        plant=plant,
+        instance=instance,
+        tool=add_tool(tool),
+        joints=joints,
+        actuators=actuators,
+        wrist=WrenchSensor(plant, wrist),
+        config=config,
+        model=model,
+        drive=drive,
+    )
     for joint, angle in zip(joints, arm.home, strict=True):
         joint.set_default_angle(angle)
     return arm

@@ -2,150 +2,76 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import (
-    CollisionFilterDeclaration,
-    FilterId,
-    GeometrySet,
-    ProximityProperties,
-    RoleAssign,
-    SceneGraph,
-)
+from pydrake.geometry import ProximityProperties, RoleAssign, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
-from pydrake.multibody.tree import Joint, RigidBody, SpatialInertia, UnitInertia, WeldJoint
+from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context
 
 from cell.configuration.config import CellConfig
+from cell.sleep import Sleep
 
 BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
 
 
-@dataclass
+@dataclass(frozen=True)
 class JigBase:
     """The base in the plant; a free one has the mass and friction of the configuration.
 
     Attributes:
         config: Of the cell.
-        plant, scene_graph: Plain Drake.
+        plant: Plain Drake.
         body: The base; its frame is the jig frame J.
         plate: The force plate that it stands on.
+        sleeper: Puts it to sleep.
     """
 
     config: CellConfig
     plant: MultibodyPlant
-    scene_graph: SceneGraph
     body: RigidBody
     plate: RigidBody
-    _filter: FilterId | None = None
-
-    @staticmethod
-    def prepare(
-        plant: MultibodyPlant,
-        scene_graph: SceneGraph,
-        weld: WeldJoint,
-        body: RigidBody,
-        config: CellConfig,
-    ) -> JigBase:
-        """Let a base that is not bolted down slide as configured; call before `Finalize`.
-
-        Args:
-            plant: Holds the work cell already.
-            scene_graph: The plant's.
-            weld: Under the force plate.
-            body: The base.
-            config: Says whether it is free.
-        """
-        plate = weld.child_body()
-        if not config.workcell.jig_base_fixed:
-            for sliding in (plate, body):
-                _set_sliding(plant, scene_graph, sliding, config.push.base_friction)
-        return JigBase(config, plant, scene_graph, body, plate)
+    sleeper: Sleep
 
     @property
     def free(self) -> bool:
         """Whether it can slide."""
         return not self.config.workcell.jig_base_fixed
 
-    @property
-    def asleep(self) -> bool:
-        """Whether it rests, locked and without contact."""
-        return self._filter is not None
+    def asleep(self, root: Context) -> bool:
+        """Return whether it rests, locked and without contact to the force plate."""
+        return self.free and self.body.is_locked(self.plant.GetMyContextFromRoot(root))
 
     def X_WJ(self, context: Context) -> RigidTransform:
         """Return its true pose (plant context)."""
         return self.plant.EvalBodyPoseInWorld(context, self.body)
 
-    def reset(self, root: Context, X_WJ: RigidTransform) -> None:
-        """Set a free base down, awake and at rest, in a Context where nothing is known of it yet.
-
-        Args:
-            root: Context of the diagram.
-            X_WJ: Where; a bolted base stays where it is.
-        """
-        self._show(root)
+    def reset(self, root: Context) -> None:
+        """Give a free base its mass with the beads, in a new Context."""
         if self.free:
             context = self.plant.GetMyMutableContextFromRoot(root)
-            self._joint.Unlock(context)
+            self.body.SetSpatialInertiaInBodyFrame(context, _inertia(self.config))
+
+    def set_down(self, root: Context, X_WJ: RigidTransform) -> None:
+        """Put a free base somewhere, awake and at rest; a bolted one stays where it is."""
+        if self.free:
+            self.wake(root)
+            context = self.plant.GetMyMutableContextFromRoot(root)
             self.plant.SetFreeBodyPose(context, self.body, X_WJ)
             self.plant.SetFreeBodySpatialVelocity(context, self.body, SpatialVelocity.Zero())
-            self.body.SetSpatialInertiaInBodyFrame(context, _inertia(self.config))
 
     def sleep(self, root: Context) -> None:
         """Let a free base rest where it is: nothing pushes it, so nothing is computed."""
-        if not self.free or self.asleep:
-            return
-        context = self.plant.GetMyMutableContextFromRoot(root)
-        self.plant.SetFreeBodySpatialVelocity(context, self.body, SpatialVelocity.Zero())
-        self._joint.Lock(context)
-        self._hide(root)
+        if self.free:
+            self.sleeper.put_to_sleep(root, self.body, apart_from=[self.plate])
 
     def wake(self, root: Context) -> None:
         """Let it move again, from rest."""
-        if self.asleep:
-            self._show(root)
-            self._joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
-
-    @contextmanager
-    def filters_lifted(self, root: Context) -> Iterator[None]:
-        """Lift a sleeping base's filter: passing filters forbid lasting changes of geometry."""
-        hidden = self.asleep
-        if hidden:
-            self._show(root)
-        try:
-            yield
-        finally:
-            if hidden:
-                self._hide(root)
-
-    def _hide(self, root: Context) -> None:
-        geometries = self.plant.GetCollisionGeometriesForBody
-        pair = GeometrySet(geometries(self.body)), GeometrySet(geometries(self.plate))
-        apart = CollisionFilterDeclaration().ExcludeBetween(*pair)
-        self._filter = self._filters(root).ApplyTransient(apart)
-
-    def _show(self, root: Context) -> None:
-        if self._filter is not None:
-            self._filters(root).RemoveDeclaration(self._filter)
-            self._filter = None
-
-    def _filters(self, root: Context):
-        context = self.scene_graph.GetMyMutableContextFromRoot(root)
-        return self.scene_graph.collision_filter_manager(context)
-
-    @property
-    def _joint(self) -> Joint:
-        (joint,) = [
-            joint
-            for joint in map(self.plant.get_joint, self.plant.GetJointIndices())
-            if joint.child_body().index() == self.body.index()
-        ]
-        return joint
+        if self.free:
+            self.sleeper.wake(root, self.body, apart_from=[self.plate])
 
 
 def _inertia(config: CellConfig) -> SpatialInertia:
@@ -162,10 +88,10 @@ def _inertia(config: CellConfig) -> SpatialInertia:
     return base
 
 
-def _set_sliding(
+def set_sliding_friction(
     plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, friction: float
 ) -> None:
-    """Set the friction between base and force plate."""
+    """Set the friction of a body's collision geometries, before the plant is finalized."""
     inspector = scene_graph.model_inspector()
     for geometry in plant.GetCollisionGeometriesForBody(body):
         properties = ProximityProperties(inspector.GetProximityProperties(geometry))

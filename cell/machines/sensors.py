@@ -1,60 +1,58 @@
-"""What the cell can know of itself: wrenches at wrists and force plate, poses of parts."""
+"""Force-torque sensors of the cell: at the wrists and under the force plate."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.common.value import AbstractValue
+from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import WeldJoint
-from pydrake.systems.framework import Context
-
-from cell.workpieces.parts import Parts
+from pydrake.systems.framework import BasicVector, Context, DiagramBuilder, LeafSystem, OutputPort
 
 
-@dataclass(frozen=True)
-class WrenchSensor:
+class WrenchSensor(LeafSystem):
     """A six-axis force-torque sensor built into a weld.
 
     The reading is the wrench that the body beyond the weld (the tool, the force plate with all it
     carries) exerts on the sensor, expressed in W, about the weld's origin; weights are in it.
+    Output port ``wrench`` (6): torque [N m], then force [N].
+
+    Args:
+        plant: The plant.
+        weld: Where it is built in.
     """
 
-    plant: MultibodyPlant
-    weld: WeldJoint
+    def __init__(self, plant: MultibodyPlant, weld: WeldJoint) -> None:
+        super().__init__()
+        self.plant, self.weld = plant, weld
+        self._index = int(weld.index())
+        self._body = int(weld.child_body().index())
+        self._R_BJc = weld.frame_on_child().GetFixedPoseInBodyFrame().rotation()
+        forces, poses = AbstractValue.Make([SpatialForce()]), AbstractValue.Make([RigidTransform()])
+        self._forces_in = self.DeclareAbstractInputPort("reaction_forces", forces)
+        self._poses_in = self.DeclareAbstractInputPort("body_poses", poses)
+        self.DeclareVectorOutputPort("wrench", 6, self._calc)
+
+    def connect(self, builder: DiagramBuilder, name: str) -> OutputPort:
+        """Add it to a diagram under a name, connected to the finalized plant; return its output."""
+        builder.AddNamedSystem(name, self)
+        builder.Connect(self.plant.get_reaction_forces_output_port(), self._forces_in)
+        builder.Connect(self.plant.get_body_poses_output_port(), self._poses_in)
+        return self.get_output_port()
+
+    def _calc(self, context: Context, output: BasicVector) -> None:
+        X_WB = self._poses_in.Eval(context)[self._body]
+        F_CJc_Jc = self._forces_in.Eval(context)[self._index]
+        output.SetFromVector(_wrench(X_WB.rotation() @ self._R_BJc, F_CJc_Jc))
 
     def read(self, plant_context: Context) -> np.ndarray:
-        """Return the wrench (6,): torque [N m], then force [N], in W."""
+        """Return the wrench (6,), given the plant's context: the same as the output port's."""
         forces = self.plant.get_reaction_forces_output_port().Eval(plant_context)
-        F_CJc_Jc = forces[int(self.weld.index())]
-        # Drake reports what the joint exerts on its child, in the joint frame on the child.
         R_WJc = self.weld.frame_on_child().CalcPoseInWorld(plant_context).rotation()
-        return -np.concatenate([R_WJc @ F_CJc_Jc.rotational(), R_WJc @ F_CJc_Jc.translational()])
+        return _wrench(R_WJc, forces[self._index])
 
 
-@dataclass(frozen=True)
-class PoseSensor:
-    """Where a part is: the truth plus configurable noise. A camera will take its place.
-
-    Attributes:
-        parts: The parts it sees.
-        position_noise: Standard deviation per axis [m].
-        angle_noise: Standard deviation about each axis [rad].
-        rng: Source of the noise.
-    """
-
-    parts: Parts
-    position_noise: float
-    angle_noise: float
-    rng: np.random.Generator
-
-    def read(self, plant_context: Context, name: str) -> RigidTransform:
-        """Return the sensed pose X_WP of a part."""
-        X_WP = self.parts[name].X_WP(plant_context)
-        if self.position_noise == 0.0 and self.angle_noise == 0.0:
-            return X_WP
-        offset = self.rng.normal(scale=self.position_noise, size=3)
-        turn = RollPitchYaw(self.rng.normal(scale=self.angle_noise, size=3))
-        X_PS = RigidTransform(turn, [0.0, 0.0, 0.0])
-        return RigidTransform(X_WP.rotation(), X_WP.translation() + offset) @ X_PS
+def _wrench(R_WJc, F_CJc_Jc: SpatialForce) -> np.ndarray:
+    """Drake reports what the joint exerts on its child C, in the joint frame Jc on the child."""
+    return -np.concatenate([R_WJc @ F_CJc_Jc.rotational(), R_WJc @ F_CJc_Jc.translational()])

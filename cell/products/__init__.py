@@ -1,4 +1,4 @@
-"""What is assembled: parts, fasteners and orders, from product files, STEP, glTF or meshes.
+"""What is assembled: parts, the joints between them and orders, from product files, STEP or meshes.
 
-Input is checked and repaired here and nowhere else; a `Product` that exists can be used.
+Input is validated and repaired here and nowhere else: a `Product` that exists is consistent.
 """

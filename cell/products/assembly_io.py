@@ -1,7 +1,7 @@
-"""Assemblies in one file, STEP or glTF: names, instances and units as in the file, as triangles.
+"""Reading assemblies from one file, STEP or glTF, as triangle meshes named by instance.
 
-OpenCASCADE reads STEP, through ``cascadio``; what it hands over is glTF, in metres by its
-specification, whatever the unit of the file.
+OpenCASCADE, through ``cascadio``, converts STEP to glTF, which is in metres by its specification,
+whatever the unit of the STEP file.
 """
 
 from __future__ import annotations
@@ -11,32 +11,36 @@ import os
 import re
 from collections.abc import Iterator
 from contextlib import contextmanager
+from itertools import chain, count
 from pathlib import Path
 
 import trimesh
 
-from cell.errors import CellError
-from cell.products.mesh_io import check_mesh, joined
+from cell.errors import InputError
+from cell.products.mesh_io import check_mesh, merged
 
 GLTF_SUFFIX = ".glb"
 ASSEMBLY_SUFFIXES = (".step", ".stp", GLTF_SUFFIX)
 
-DEFLECTION = 0.005  # [mm] [D] A tenth of the usual tolerance on fits.
-FACET_ANGLE = 0.1  # [rad] [D] 63 facets a turn: 7 um of sagitta on a hole of 12 mm.
+DEFLECTION = 0.005
+"""[mm] [D] a tenth of the usual tolerance on fits."""
 
-# Names that exporters make up where the designer gave the instance none.
-NAMELESS = re.compile(r"NAUO\d*|=>\[.*\]|\d*|Solid\d*|Open CASCADE.*", re.IGNORECASE)
+FACET_ANGLE = 0.1
+"""[rad] [D] 63 facets per turn: 7 um of sagitta on a hole of 12 mm."""
+
+# Names that exporters generate for instances without one.
+GENERATED_NAME = re.compile(r"NAUO\d*|=>\[.*\]|\d*|Solid\d*|Open CASCADE.*", re.IGNORECASE)
 
 
 def load_assembly(file: Path) -> dict[str, trimesh.Trimesh]:
     """Read every solid of a file, in its assembled pose [m], by the name of its instance.
 
-    An instance without a name has that of its product; the second of two with one name gets a
-    number. Names keep their letters and digits; all else becomes "_", so that they can be listed in
-    an order.
+    An instance without a name takes that of its product; a name that is taken gets a number.
+    Characters other than letters, digits, ".", "-" and "_" become "_", so that names can be listed
+    in an order.
 
     Raises:
-        CellError: The file cannot be read, or holds no solid.
+        InputError: The file cannot be read, or holds no solid.
         BadPart: A solid is open, flat, or implausibly large or small.
     """
     scene = _scene(file)
@@ -47,36 +51,40 @@ def load_assembly(file: Path) -> dict[str, trimesh.Trimesh]:
         shape = scene.geometry[product]
         if not isinstance(shape, trimesh.Trimesh):
             continue
-        name = _unused(_name(node, product), meshes)
-        surface = joined(shape)
+        label = product if GENERATED_NAME.fullmatch(str(node)) else str(node)
+        label = re.sub(r"[^\w.-]+", "_", label).strip("_") or "part"
+        names = chain([label], (f"{label}_{k}" for k in count(2)))
+        name = next(name for name in names if name not in meshes)
+        surface = merged(shape)
         surface.apply_transform(X_AP)
         meshes[name] = check_mesh(surface, name)
     if not meshes:
-        raise CellError(f"'{file}' holds no solid.")
+        raise InputError(f"'{file}' holds no solid.")
     return dict(sorted(meshes.items(), key=lambda item: _natural(item[0])))
 
 
 def _scene(file: Path) -> trimesh.Scene:
+    """Return the content of a STEP or glTF file, in metres."""
     try:
         data = file.read_bytes()
     except OSError as error:
-        raise CellError(f"'{file}' cannot be read: {error.strerror}.") from error
+        raise InputError(f"'{file}' cannot be read: {error.strerror}.") from error
     binary = data
     if file.suffix.lower() != GLTF_SUFFIX and not (binary := _converted(data)):
-        raise CellError(f"'{file}' is not a STEP file that can be read.")
+        raise InputError(f"'{file}' is not a STEP file that can be read.")
     try:
         scene = trimesh.load_scene(
             io.BytesIO(binary), file_type="glb", process=False, merge_primitives=True
         )
-    except Exception as error:  # The reader raises whatever it likes, in its own words.
-        raise CellError(f"'{file}' is not a glTF file that can be read.") from error
+    except Exception as error:  # The reader documents no exceptions of its own.
+        raise InputError(f"'{file}' is not a glTF file that can be read.") from error
     if not scene.geometry:
-        raise CellError(f"'{file}' holds no solid.")
+        raise InputError(f"'{file}' holds no solid.")
     return scene
 
 
 def _converted(data: bytes) -> bytes:
-    """Return a STEP file as binary glTF; empty if it is none."""
+    """Return a STEP file as binary glTF; empty if it is not a STEP file."""
     import cascadio  # Takes 0.1 s to load, which only STEP files need.
 
     with _without_output():
@@ -87,30 +95,17 @@ def _converted(data: bytes) -> bytes:
 
 @contextmanager
 def _without_output() -> Iterator[None]:
-    """Keep OpenCASCADE's own messages, which go to the process's streams, off the terminal."""
-    with open(os.devnull, "w") as nowhere:
+    """Discard what OpenCASCADE writes to the process's standard streams."""
+    with open(os.devnull, "w") as null:
         saved = [os.dup(stream) for stream in (1, 2)]
         try:
             for stream in (1, 2):
-                os.dup2(nowhere.fileno(), stream)
+                os.dup2(null.fileno(), stream)
             yield
         finally:
             for stream, copy in zip((1, 2), saved, strict=True):
                 os.dup2(copy, stream)
                 os.close(copy)
-
-
-def _name(instance: str, product: str) -> str:
-    name = product if NAMELESS.fullmatch(instance) else instance
-    return re.sub(r"[^\w.-]+", "_", name).strip("_") or "part"
-
-
-def _unused(name: str, taken: dict[str, trimesh.Trimesh]) -> str:
-    number, free = 1, name
-    while free in taken:
-        number += 1
-        free = f"{name}_{number}"
-    return free
 
 
 def _natural(name: str) -> list[tuple[int, str]]:

@@ -1,30 +1,42 @@
-"""Identical parts: the same shape several times over, wherever it stands and however it is turned.
+"""Identical parts: parts of the same shape, in whatever pose.
 
 Two parts count as identical when volume, area, number of faces, principal moments of inertia and
-handedness agree. A part and its mirror image differ in handedness, unless the shape has too little
-asymmetry to tell (a plane of symmetry), and then they are the same.
+handedness agree. A part and its mirror image differ in handedness unless the shape has a plane of
+symmetry, and then they are the same shape.
 """
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Mapping, Sequence
+from itertools import chain, count
 
 import numpy as np
 import trimesh
 
 from cell.products.product import Product
 
-SAME = 1e-3  # [A] Relative: above the rounding of files, below any difference that is meant.
-HANDED = 1e-4  # [A] Of the largest that it can be: less is a shape with a plane of symmetry.
+SAME = 1e-3
+"""[A] relative tolerance: above the rounding of files, below any intended difference."""
+
+HANDED = 1e-4
+"""[A] of its largest possible value; a smaller triple product means a plane of symmetry."""
 
 
 def identical_parts(meshes: Mapping[str, trimesh.Trimesh]) -> list[tuple[str, ...]]:
-    """Return the names of parts of one shape, for each shape that occurs twice or more."""
+    """Return, for each shape that occurs more than once, the names of the parts that have it."""
     groups: list[tuple[np.ndarray, list[str]]] = []
     for name, mesh in meshes.items():
         own = signature(mesh)
-        same = next((names for other, names in groups if _agree(own, other)), None)
+        same = next(
+            (
+                names
+                for other, names in groups
+                if own[-1] == other[-1] and np.all(np.abs(own - other) <= SAME * own[0])
+            ),
+            None,
+        )
         if same is None:
             groups.append((own, [name]))
         else:
@@ -33,7 +45,7 @@ def identical_parts(meshes: Mapping[str, trimesh.Trimesh]) -> list[tuple[str, ..
 
 
 def signature(mesh: trimesh.Trimesh) -> np.ndarray:
-    """Return numbers (7,) that do not change with the pose: all but the last are lengths [m]."""
+    """Return pose invariants (7,): five lengths [m], thousands of faces, and the handedness."""
     moments = np.sort(np.asarray(mesh.principal_inertia_components)) / mesh.volume
     lengths = [abs(mesh.volume) ** (1 / 3), np.sqrt(mesh.area), *np.sqrt(np.abs(moments))]
     return np.array([*lengths, 1e-3 * len(mesh.faces), handedness(mesh)])
@@ -42,8 +54,8 @@ def signature(mesh: trimesh.Trimesh) -> np.ndarray:
 def handedness(mesh: trimesh.Trimesh) -> float:
     """Return +1 or -1 for a shape that differs from its mirror image, else 0.
 
-    The sign of the triple product of three vectors that turn with the shape: third, fifth and
-    seventh moments of its surface about the centre of mass. Mirroring changes the sign.
+    It is the sign of the triple product of three vectors that rotate with the shape: third, fifth
+    and seventh moments of its surface about the centre of mass. Mirroring changes the sign.
     """
     r = mesh.triangles_center - mesh.center_mass
     r = r / np.sqrt(mesh.area)
@@ -57,16 +69,16 @@ def handedness(mesh: trimesh.Trimesh) -> float:
     return 0.0 if abs(triple) <= HANDED * scale or scale < 1e-20 else float(np.sign(triple))
 
 
-def _agree(a: np.ndarray, b: np.ndarray) -> bool:
-    return bool(np.all(np.abs(a[:-1] - b[:-1]) <= SAME * np.abs(a[0])) and a[-1] == b[-1])
-
-
 def group_identical(
     product: Product, same: Sequence[tuple[str, ...]]
 ) -> dict[str, tuple[str, ...]]:
     """Return groups, by name, of the identical parts that are in no group yet.
 
-    A group has the common beginning of its members' names, in the plural: bolt_1, bolt_2 are bolts.
+    A group is named by the common prefix of its members, in the plural: bolt_1, bolt_2 are bolts.
+
+    Args:
+        product: Its groups and names are taken.
+        same: Sets of identical parts, as from `identical_parts`.
     """
     taken = {name for members in product.groups.values() for name in members}
     groups: dict[str, tuple[str, ...]] = {}
@@ -78,14 +90,11 @@ def group_identical(
     return groups
 
 
-def _plural(names: Sequence[str], taken: set[str]) -> str:
-    stem = names[0]
-    while stem and not all(name.startswith(stem) for name in names):
-        stem = stem[:-1]
-    stem = re.sub(r"[\d_.\- ]+$", "", stem) or re.sub(r"[\d_.\- ]+$", "", names[0]) or "part"
+def _plural(members: Sequence[str], taken: set[str]) -> str:
+    """Return the common prefix of the names, without number, in the plural, and not taken."""
+    number = re.compile(r"[\d_.\- ]+$")
+    prefix = os.path.commonprefix(list(members))
+    stem = number.sub("", prefix) or number.sub("", members[0]) or "part"
     plural = stem if stem.endswith("s") else f"{stem}s"
-    number, free = 1, plural
-    while free in taken:
-        number += 1
-        free = f"{plural}_{number}"
-    return free
+    names = chain([plural], (f"{plural}_{k}" for k in count(2)))
+    return next(name for name in names if name not in taken)

@@ -1,4 +1,4 @@
-"""Meshes at the door: units, soundness and plausible size are checked here and nowhere else."""
+"""Reading meshes, with validation of units, soundness and plausible size; and writing them."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 
-from cell.errors import BadPart, CellError, UnknownName
+from cell.errors import BadPart, InputError, UnknownName
 from cell.products.repair import repaired
 
 METERS_PER_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
@@ -17,19 +17,19 @@ MESH_SUFFIXES = (".obj", ".stl", ".ply", ".glb")
 """File types that are read; glTF is in metres by its specification, the others store no unit."""
 
 UNIT_SUFFIXES = (".glb",)
-"""Those of them that are in metres by their specification."""
+"""The file types that are in metres by their specification."""
 
 REPAIR = "repair"
-"""Key of a mesh's metadata: what was done to close its surface, if anything."""
+"""Key in a mesh's metadata: what was done to close its surface, "" for nothing."""
 
 LARGEST_PART = 1.0
-"""[m] [D] the reach of the arms is 0.85 m: a longer part is a part in wrong units."""
+"""[m] [D] the reach of the arms is 0.85 m: a longer part was read in wrong units."""
 
 SMALLEST_PART = 2e-4
-"""[m] [D] a tenth of the smallest bolt's diameter: a smaller part is a part in wrong units."""
+"""[m] [D] a tenth of the smallest bolt's diameter: a smaller part was read in wrong units."""
 
 CREASE = 0.5
-"""[rad] [R] edges sharper than this stay sharp in pictures (Drake renders need normals)."""
+"""[rad] [R] edges sharper than this keep separate normals, so that they are rendered sharp."""
 
 
 def meters_per_unit(units: str) -> float:
@@ -68,11 +68,11 @@ def load_folder(folder: Path, units: str | None = None) -> dict[str, trimesh.Tri
     files = [f for f in sorted(folder.iterdir()) if f.suffix.lower() in MESH_SUFFIXES]
     if not files:
         kinds = ", ".join(MESH_SUFFIXES)
-        raise CellError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
+        raise InputError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
     without = [file.name for file in files if file.suffix.lower() not in UNIT_SUFFIXES]
     if units is None and without:
         known = ", ".join(METERS_PER_UNIT)
-        raise CellError(f"'{without[0]}' states no unit of length: add --units, one of {known}.")
+        raise InputError(f"'{without[0]}' states no unit of length: add --units, one of {known}.")
     meshes: dict[str, trimesh.Trimesh] = {}
     for file in files:
         if file.stem in meshes:
@@ -107,7 +107,7 @@ def check_mesh(mesh: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
 
 
 def _open_edges(mesh: trimesh.Trimesh) -> str:
-    """Return how many edges do not belong to two faces, and where the first of them is."""
+    """Return how many edges are not shared by exactly two faces, and where the first of them is."""
     edges, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
     edges = edges[count != 2]
     if not len(edges):
@@ -117,19 +117,19 @@ def _open_edges(mesh: trimesh.Trimesh) -> str:
 
 
 def _read(path: Path, name: str) -> trimesh.Trimesh:
-    """Return the file's surface with coincident vertices joined, in the file's unit."""
+    """Return the file's surface with coincident vertices merged, in the file's unit."""
     try:
         mesh = trimesh.load_mesh(path, process=False)
-    except Exception as error:  # Readers of six formats raise whatever they like.
+    except Exception as error:  # The readers of the formats share no exception type.
         raise BadPart(name, f"'{path.name}' cannot be read ({error})") from error
     mesh = mesh.to_mesh() if isinstance(mesh, trimesh.Scene) else mesh
     if not isinstance(mesh, trimesh.Trimesh):
         raise BadPart(name, f"'{path.name}' holds no surface")
-    return joined(mesh)
+    return merged(mesh)
 
 
-def joined(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return a surface with coincident corners joined, whatever normals and colours they have."""
+def merged(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+    """Return a surface with coincident vertices merged, whatever their normals and colours."""
     surface = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
     surface.merge_vertices(merge_norm=True, merge_tex=True)
     return surface
@@ -140,8 +140,8 @@ def obj_text(mesh: trimesh.Trimesh, *, normals: bool = False) -> str:
 
     Args:
         mesh: Surface [m].
-        normals: Write a normal per corner, which the renderer needs. Positions stay shared
-            between faces, so that the surface is read back watertight.
+        normals: Whether to write a normal per face corner, which the renderer needs. Positions
+            stay shared between faces, so that the surface is read back watertight.
     """
     if not normals:
         corners = [" ".join(str(i + 1) for i in face) for face in mesh.faces]

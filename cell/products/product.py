@@ -1,15 +1,15 @@
-"""What is assembled: parts in their assembled poses, fasteners, and the orders of assembly."""
+"""What is assembled: parts in their assembled poses, joints between them, and assembly orders."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
-import numpy as np
 import trimesh
 from pydrake.math import RigidTransform
 
-from cell.errors import UnknownName
+from cell.errors import InputError, UnknownName
+from cell.products.joints import Fit, Joint, Screw
 
 
 @dataclass(frozen=True)
@@ -57,80 +57,48 @@ class Part:
 
 
 @dataclass(frozen=True)
-class Fastener:
-    """A threaded part and the hole it is driven into.
-
-    Attributes:
-        part: Name of the bolt.
-        into: Name of the part that carries the thread.
-        clamps: Name of the part under the head.
-        thread: Designation, for example "M3".
-        diameter: Nominal diameter d [m].
-        pitch: Thread pitch P [m].
-        thread_depth: Engaged length of thread when seated [m].
-        torque: Tightening torque T [N m].
-        nut_factor: K in T = K d F.
-    """
-
-    part: str
-    into: str
-    clamps: str
-    thread: str
-    diameter: float
-    pitch: float
-    thread_depth: float
-    torque: float
-    nut_factor: float
-
-
-@dataclass(frozen=True)
-class Fit:
-    """A shaft or boss of one part in a hole of another, in the assembled product.
-
-    Attributes:
-        shaft: Name of the part with the shaft.
-        hole: Name of the part with the hole.
-        p_AoF: Centre F of the hole's mouth, where the shaft enters, in the product frame A [m].
-        depth: Length of the fit [m]: how far before the seat the shaft meets the hole.
-    """
-
-    shaft: str
-    hole: str
-    p_AoF: np.ndarray
-    depth: float
-
-
-@dataclass(frozen=True)
 class Product:
-    """Parts in assembled poses, with groups, fasteners and assembly orders.
+    """Parts in assembled poses, with groups, joints and assembly orders.
 
     Attributes:
         name: For example "motor_unit".
         parts: By name, in matrix order.
         groups: Group name -> names of its parts; a group is one item of an assembly order.
         orders: Assembly orders, each a tuple of part or group names; the first is the default.
-        fasteners: By the name of the bolt.
-        fits: Shafts in holes.
+        joints: What holds the parts together, in the order of the product file.
         up: Axis of the product frame that points up on the jig: "+x" ... "-z".
         contact_tolerance: Gap up to which two parts count as touching, and overlap up to which they
             do not block each other [m]; None to derive it from sizes and clearances.
-        tray: Name of the SDF model of the tray that presents the parts, if there is one.
-        remarks: What was assumed or repaired while it was read, a sentence each.
+        tray: Name of the SDF model of the tray that presents the parts; None if there is none.
+        remarks: What was assumed or repaired when it was read, one sentence each.
     """
 
     name: str
     parts: Mapping[str, Part]
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
-    fasteners: Mapping[str, Fastener] = field(default_factory=dict)
-    fits: tuple[Fit, ...] = ()
+    joints: tuple[Joint, ...] = ()
     up: str = "+z"
     contact_tolerance: float | None = None
     tray: str | None = None
     remarks: tuple[str, ...] = ()
 
+    @property
+    def fits(self) -> tuple[Fit, ...]:
+        """The joints that are fits of a shaft in a hole."""
+        return tuple(joint for joint in self.joints if isinstance(joint, Fit))
+
+    @property
+    def screws(self) -> Mapping[str, Screw]:
+        """The joints that are screws, by the name of the bolt."""
+        return {joint.part: joint for joint in self.joints if isinstance(joint, Screw)}
+
     def members(self, item: str) -> tuple[str, ...]:
-        """Return the part names behind an item of an order: a group's members, or the part."""
+        """Return the part names behind an item of an order: a group's members, or the part itself.
+
+        Raises:
+            UnknownName: Neither a part nor a group.
+        """
         if item in self.groups:
             return self.groups[item]
         if item in self.parts:
@@ -141,3 +109,20 @@ class Product:
         """Return groups and ungrouped parts, in part order: what an assembly order must list."""
         grouped = {name: group for group, names in self.groups.items() for name in names}
         return tuple(dict.fromkeys(grouped.get(name, name) for name in self.parts))
+
+    def check_simulable(self) -> None:
+        """Raise `InputError` for a product that can be planned but not simulated.
+
+        Every part needs a model with contact geometry, and a place in the tray to start from.
+        """
+        parts = self.parts.values()
+        lacking = {
+            "a contact model": [part.name for part in parts if part.model is None],
+            "a place in the tray": [part.name for part in parts if part.X_TrayP is None],
+        }
+        missing = [f"{', '.join(names)}: {what}" for what, names in lacking.items() if names]
+        if missing:
+            raise InputError(
+                f"Product '{self.name}' can be planned, but not assembled in the twin; missing for "
+                f"{'; for '.join(missing)}. A product file states both, as 'model' and 'tray_pose'."
+            )

@@ -1,8 +1,8 @@
-"""Repairs of surfaces as CAD exports them, where nothing about the shape has to be guessed.
+"""Repairs of meshes as CAD exports them, where nothing about the shape has to be guessed.
 
-Corners within rounding of each other are one corner; faces that have lost an edge by that, and
-faces that occur twice, go; faces that look inwards among faces that look outwards are turned. A
-hole in the surface is not closed: what belongs there is for the designer to say.
+Vertices within rounding of each other are merged; degenerate and duplicate faces are removed; faces
+of inconsistent winding are flipped. Holes in the surface are left open: their shape is the
+designer's to decide.
 """
 
 from __future__ import annotations
@@ -12,14 +12,18 @@ import trimesh
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import breadth_first_order
 
-WELDS = (1e-9, 1e-8, 1e-7, 1e-6)  # [m] Tried in turn: rounding of double, of float32 in m, in mm.
+WELDS = (1e-9, 1e-8, 1e-7, 1e-6)
+"""[m] tried in turn: rounding of float64, and of float32 in metres and in millimetres."""
 
 
 def repaired(mesh: trimesh.Trimesh) -> tuple[trimesh.Trimesh, str]:
-    """Return a closed surface, and what was done to it; as it is if nothing safe closes it.
+    """Return a closed surface and a remark on the repair; the mesh itself if none closes it.
 
     Args:
-        mesh: Surface [m], coincident corners joined.
+        mesh: Surface [m], coincident vertices merged.
+
+    Returns:
+        The surface and what was done to it, "" for nothing.
     """
     if _sound(mesh):
         return mesh, ""
@@ -37,7 +41,7 @@ def _sound(mesh: trimesh.Trimesh) -> bool:
 
 
 def _cleaned(mesh: trimesh.Trimesh, distance: float) -> trimesh.Trimesh:
-    """Return the surface with corners welded, and without faces that are lines or doubled."""
+    """Return the surface with vertices merged, and without degenerate and duplicate faces."""
     cells = np.round(np.asarray(mesh.vertices) / distance)
     _, first, index = np.unique(cells, axis=0, return_index=True, return_inverse=True)
     faces = index.ravel()[mesh.faces]
@@ -51,9 +55,9 @@ def _cleaned(mesh: trimesh.Trimesh, distance: float) -> trimesh.Trimesh:
 
 
 def _wound(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return the surface with the faces of each body turned like the first of them."""
+    """Return the surface with the faces of each body wound like the first of them."""
     faces, pairs = np.array(mesh.faces), np.asarray(mesh.face_adjacency)
-    # Two faces agree if they run along their common edge in opposite senses.
+    # Two faces agree if they traverse their common edge in opposite senses.
     agree = np.array(
         [
             _runs_along(faces[a], edge) != _runs_along(faces[b], edge)
@@ -75,7 +79,7 @@ def _wound(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
 
 
 def _runs_along(face: np.ndarray, edge: np.ndarray) -> bool:
-    """Say whether a face has its edge in the sense in which the edge is given."""
+    """Return whether a face traverses one of its edges in the sense in which the edge is given."""
     start = int(np.flatnonzero(face == edge[0])[0])
     return bool(face[(start + 1) % 3] == edge[1])
 

@@ -2,50 +2,42 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
-from cell.fixtures.soft_jig import SurfaceSamples
+from cell.simulation.phase import Event
 from cell.simulation.simulation import Simulation
 
-Event = Callable[[Simulation], None]
+
+def prepare_fixture(simulation: Simulation) -> None:
+    """Make the fixture ready for a new part: what an earlier one has left is gone."""
+    simulation.cell.fixture.prepare(simulation.root)
 
 
-def inflate_jig(simulation: Simulation) -> None:
-    """Blow the bag up: every imprint is gone."""
-    simulation.cell.soft_jig.inflate(simulation.root)
-
-
-def soften_jig(part: str) -> Event:
-    """Let the bag go soft and carry a part that will be pressed into it."""
+def receive_part(part: str) -> Event:
+    """Let a part be put onto the fixture."""
 
     def event(simulation: Simulation) -> None:
-        simulation.cell.soft_jig.soften(simulation.root)
-        press_into_bed(simulation, part)
+        loose = simulation.cell.parts[part]
+        simulation.cell.fixture.receive(simulation.root, loose.body, loose.part.mesh)
 
     return event
 
 
-def press_into_bed(simulation: Simulation, part: str) -> None:
-    """Let the soft bed carry a part by its real surface."""
-    cell = simulation.cell
-    samples = SurfaceSamples.of(part, cell.product.parts[part].mesh)
-    cell.soft_jig.press_with(cell.parts[part].body, samples)
+def fix_part(simulation: Simulation) -> None:
+    """Let the fixture begin to hold what it has received."""
+    simulation.cell.fixture.fix(simulation.root)
 
 
-def release_from_jig(part: str) -> Event:
-    """Let the bed forget a part that has been lifted off it."""
+def free_part(simulation: Simulation) -> None:
+    """Let the fixture begin to let go."""
+    simulation.cell.fixture.free(simulation.root)
+
+
+def release_part(part: str) -> Event:
+    """Let the fixture forget a part that has been lifted off it."""
 
     def event(simulation: Simulation) -> None:
-        simulation.cell.soft_jig.release(simulation.cell.parts[part].body)
+        simulation.cell.fixture.release(simulation.root, simulation.cell.parts[part].body)
 
     return event
-
-
-def evacuate_jig(simulation: Simulation) -> None:
-    """Start the vacuum pump, unless the configured vacuum is none at all: the bag stays soft."""
-    jig = simulation.cell.soft_jig
-    if jig.params.vacuum.pressure > 0:
-        jig.evacuate(simulation.root)
 
 
 def rest_jig(simulation: Simulation) -> None:

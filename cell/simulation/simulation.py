@@ -6,17 +6,27 @@ import time
 from collections.abc import Iterable
 
 import numpy as np
-from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
 from cell.builder import Cell
-from cell.errors import CellError
-from cell.fixtures.soft_jig import JigState
+from cell.errors import InputError, UnknownName
 from cell.machines.arm import Arm
-from cell.machines.sensors import PoseSensor
+from cell.machines.driver import Driver
+from cell.machines.gripper import Gripper
 from cell.simulation.log import Log
-from cell.simulation.phase import ArmCommand, Follow, Impedance, Outcome, Phase, PhaseFailed, Sensed
+from cell.simulation.phase import (
+    ArmCommand,
+    Command,
+    Follow,
+    Impedance,
+    Jaw,
+    Outcome,
+    Phase,
+    PhaseFailed,
+    Sensed,
+    Spin,
+)
 
 # Damping of the Cartesian impedance uses these effective masses: dominated by the reflected rotor
 # inertia of 0.1 kg m^2 at a lever of 0.15 to 0.4 m [D].
@@ -25,43 +35,39 @@ EFFECTIVE_INERTIA = 0.15
 
 
 class Simulation:
-    """A running cell.
+    """A running cell, at first with every part asleep.
 
     Args:
         cell: A built cell (with its diagram).
-        seed: Seeds the sensor noise.
 
     Attributes:
+        simulator: Drake's, with the cell's monitor.
         root: Context of the diagram.
         context: Context of the plant.
-        sensor: Where operations learn where parts are.
         log: What happened, every ``simulation.log_period``.
         stepping_cpu: CPU seconds spent stepping so far.
+        steps: Plant steps so far.
         wrists: By arm name, the latest reading (6,) [N m, N] of the wrist.
         tare: By arm name, the reading that counts as zero.
     """
 
-    def __init__(self, cell: Cell, seed: int = 0) -> None:
+    def __init__(self, cell: Cell) -> None:
         if cell.diagram is None:
-            raise CellError(
-                "The cell has no diagram: use build_cell, or build your own and pass it."
+            raise InputError(
+                "The cell has no diagram: use build_cell, or cell.with_diagram(builder.Build())."
             )
         self.cell = cell
         self.simulator = Simulator(cell.diagram)
+        self.simulator.set_monitor(cell.monitor)
         self.root: Context = self.simulator.get_mutable_context()
         self.context = cell.plant.GetMyMutableContextFromRoot(self.root)
-        rng = np.random.default_rng(seed)
-        noise = cell.config.sensor
-        self.sensor = PoseSensor(
-            cell.parts, noise.position_noise, np.deg2rad(noise.angle_noise_deg), rng
-        )
         self.log = Log()
         self.stepping_cpu = 0.0
         self.steps = 0
-        self._bed_pushes = False
-        cell.reset(self.root)
+        cell.monitor.initialize(self.root)
+        cell.parts.sleep_all_but(self.root, ())
         self.simulator.Initialize()
-        self.wrists = {name: sensor.read(self.context) for name, sensor in cell.wrists.items()}
+        self.wrists = self.read_wrists()
         self.tare = dict(self.wrists)
 
     @property
@@ -74,26 +80,16 @@ class Simulation:
         """Simulated time [s]."""
         return self.steps * self.time_step
 
-    def sense(self, part: str) -> RigidTransform:
-        """Return the sensed pose X_WP of a part."""
-        return self.sensor.read(self.context, part)
-
     def step(self) -> None:
-        """Advance plant and jig by one time step."""
+        """Advance by one time step of the plant."""
         start = time.process_time()
         self.steps += 1
         self.simulator.AdvanceTo(self.time)
-        self.cell.soft_jig.step(self.root, self.time_step)
-        self.apply_bed_forces()
         self.stepping_cpu += time.process_time() - start
 
-    def apply_bed_forces(self) -> None:
-        """Hand the soft bed's forces to the plant for the next step."""
-        forces = self.cell.soft_jig.applied_forces
-        if forces or self._bed_pushes:
-            port = self.cell.plant.get_applied_spatial_force_input_port()
-            port.FixValue(self.context, forces)
-            self._bed_pushes = bool(forces)
+    def read_wrists(self) -> dict[str, np.ndarray]:
+        """Return the reading (6,) of each wrist [N m, N], by arm name."""
+        return {name: arm.wrist.read(self.context) for name, arm in self.cell.arms.items()}
 
     def run(self, phases: Iterable[Phase]) -> None:
         """Run an operation: a generator of phases that receives each `Outcome` back."""
@@ -145,84 +141,80 @@ class _PhaseRun:
         self.simulation, self.phase = simulation, phase
         self.cell, self.root = simulation.cell, simulation.root
         self.step = 0
-        self.commands = {"left": phase.left, "right": phase.right}
-        self.peak_force = {"left": 0.0, "right": 0.0}
+        self.peak_force = dict.fromkeys(self.cell.arms, 0.0)
         period = self.cell.config.simulation.log_period
         self.log_every = max(1, round(period / simulation.time_step))
+        self.last: Sensed | None = None
+        self.tools = {arm.tool.name: arm.tool for arm in self.cell.arms.values()}
+        self.arm_commands: dict[str, ArmCommand] = {}
         if phase.tare:
             simulation.tare = dict(simulation.wrists)
-        self.last: Sensed | None = None
-        if phase.jaw is not None:
-            self.cell.gripper.command(self.root, phase.jaw.opening, phase.jaw.force)
-        if phase.spindle is not None:
-            self.cell.driver.command(self.root, phase.spindle)
-        for name, command in self.commands.items():
-            arm = self.cell.arms[name]
-            if isinstance(command, Impedance):
-                arm.use_torque_drive()
-            elif arm.in_torque_drive():
-                self._hold_here(arm)
+        for device, command in phase.commands.items():
+            self._accept(device, command)
+        for name, arm in self.cell.arms.items():
+            if isinstance(self.arm_commands.get(name), Impedance):
+                arm.drive.use_torque(self.root, True)
+            elif arm.drive.uses_torque(self.root):
+                arm.hold_here(self.root)
 
-    def _hold_here(self, arm: Arm) -> None:
-        """Back from torque to position drive, with the target where the arm is."""
-        arm.use_position_drive()
-        drive = self.cell.drives[arm.name]
-        drive.set_effort(self.root, np.zeros(6))
-        drive.set_target(self.root, arm.positions(self.simulation.context), np.zeros(6))
+    def _accept(self, device: str, command: Command) -> None:
+        """Pass a tool's command on; keep an arm's for every step."""
+        tool = self.tools.get(device)
+        if isinstance(command, Jaw) and isinstance(tool, Gripper):
+            tool.command(self.root, command.opening, command.force)
+        elif isinstance(command, Spin) and isinstance(tool, Driver):
+            tool.command(self.root, command.speed)
+        elif not isinstance(command, Jaw | Spin) and device in self.cell.arms:
+            self.arm_commands[device] = command
+        elif device in self.tools or device in self.cell.arms:
+            kind = type(command).__name__
+            raise InputError(f"Device '{device}' does not take a {kind} command.")
+        else:
+            raise UnknownName("device", device, [*self.tools, *self.cell.arms])
 
     def command(self) -> None:
         """Send this step's command to each arm."""
-        for name, command in self.commands.items():
-            if command is not None:
-                self._command_arm(self.cell.arms[name], command)
-
-    def _command_arm(self, arm: Arm, command: ArmCommand) -> None:
-        drive = self.cell.drives[arm.name]
-        if isinstance(command, Follow):
-            if self.last is not None:
-                drive.set_target(self.root, *command.target(self.last))
-        elif not isinstance(command, Impedance):
-            # The implicit drive reaches the target at the end of the step.
-            drive.set_target(self.root, *command.at(self._time() + self.simulation.time_step))
-        else:
-            torque = impedance_torque(arm, self.simulation.context, command, self._time())
-            drive.set_effort(self.root, torque)
-
-    def _time(self) -> float:
-        return self.step * self.simulation.time_step
+        time_step = self.simulation.time_step
+        for name, command in self.arm_commands.items():
+            arm = self.cell.arms[name]
+            if isinstance(command, Follow):
+                if self.last is not None:
+                    arm.drive.set_target(self.root, *command.target(self.last))
+            elif isinstance(command, Impedance):
+                now = self.step * time_step
+                torque = impedance_torque(arm, self.simulation.context, command, now)
+                arm.drive.set_effort(self.root, torque)
+            else:
+                # The implicit drive reaches the target at the end of the step.
+                now = self.step * time_step
+                arm.drive.set_target(self.root, *command.at(now + time_step))
 
     def sense(self) -> Sensed:
         """Read the sensors after a step, and log if it is time."""
         self.step += 1
-        cell, context, simulation = self.cell, self.simulation.context, self.simulation
-        simulation.wrists = {name: sensor.read(context) for name, sensor in cell.wrists.items()}
+        context, simulation = self.simulation.context, self.simulation
+        simulation.wrists = simulation.read_wrists()
         wrench = {name: now - simulation.tare[name] for name, now in simulation.wrists.items()}
         for name, value in wrench.items():
             self.peak_force[name] = max(self.peak_force[name], float(np.linalg.norm(value[3:])))
+        tools = self.tools.items()
+        now = self.step * simulation.time_step
+        motions = [c for c in self.arm_commands.values() if not isinstance(c, Follow | Impedance)]
         self.last = Sensed(
-            time=self._time(),
+            time=now,
             step=self.step,
             wrench=wrench,
-            jaw_opening=cell.gripper.opening(context),
-            jaw_rate=cell.gripper.rate(context),
-            bit_push=cell.driver.push(context),
-            spindle_torque=cell.driver.torque(context),
-            spindle_rate=cell.driver.rate(context),
-            finished=self._motions_finished(),
+            grippers={n: tool.read(context) for n, tool in tools if isinstance(tool, Gripper)},
+            drivers={n: tool.read(context) for n, tool in tools if isinstance(tool, Driver)},
+            finished=all(now >= motion.duration for motion in motions),
             X_WF=lambda frame: frame.CalcPoseInWorld(context),
-            X_WP=lambda name: cell.parts[name].X_WP(context),
         )
-        if self.phase.fine_log or self.simulation.steps % self.log_every == 0:
+        if self.phase.fine_log or simulation.steps % self.log_every == 0:
             self._log(self.last)
         return self.last
 
-    def _motions_finished(self) -> bool:
-        commands = [c for c in self.commands.values() if c is not None]
-        motions = [c for c in commands if not isinstance(c, Follow | Impedance)]
-        return all(self._time() >= motion.duration for motion in motions)
-
     def _log(self, sensed: Sensed) -> None:
-        cell, context = self.cell, self.simulation.context
+        cell, context, root = self.cell, self.simulation.context, self.root
         q, v = cell.plant.GetPositions(context), cell.plant.GetVelocities(context)
         if not (np.isfinite(q).all() and np.isfinite(v).all()):
             raise PhaseFailed(self.phase.name, "the state is not finite")
@@ -230,26 +222,24 @@ class _PhaseRun:
             time=self.simulation.time,
             q=q,
             v=v,
-            left_wrench=sensed.wrench["left"],
-            right_wrench=sensed.wrench["right"],
+            **{f"{name}_wrench": wrench for name, wrench in sensed.wrench.items()},
             force_plate=cell.force_plate.read(context),
-            jaw_opening=sensed.jaw_opening,
-            spindle_torque=sensed.spindle_torque,
-            jig_pressure=cell.soft_jig.pressure,
-            jig_state=list(JigState).index(cell.soft_jig.state),
-            thread_turns=[thread.turns(context) for thread in cell.threads.values()],
-            clamp_force=[thread.clamp_force(context) for thread in cell.threads.values()],
+            **{f"{name}_opening": reading.opening for name, reading in sensed.grippers.items()},
+            **{f"{name}_torque": reading.torque for name, reading in sensed.drivers.items()},
+            **{f"jig_{name}": value for name, value in cell.fixture.reading(root).items()},
+            thread_turns=[cell.threads.turns(root, bolt) for bolt in cell.threads],
+            clamp_force=[cell.threads[bolt].clamp_force(context) for bolt in cell.threads],
         )
 
     def finish(self) -> None:
         """Leave the arms where their commands end; a motion that was cut short stops there."""
-        for name, command in self.commands.items():
+        for name, command in self.arm_commands.items():
             arm = self.cell.arms[name]
-            if arm.in_torque_drive():
-                self._hold_here(arm)
-            elif command is not None and not isinstance(command, Follow | Impedance):
-                q, _ = command.at(self._time())
-                self.cell.drives[name].set_target(self.root, q, np.zeros(6))
+            if arm.drive.uses_torque(self.root):
+                arm.hold_here(self.root)
+            elif not isinstance(command, Follow | Impedance):
+                q, _ = command.at(self.step * self.simulation.time_step)
+                arm.drive.set_target(self.root, q, np.zeros(arm.dof))
 
 
 def impedance_torque(arm: Arm, context: Context, command: Impedance, t: float) -> np.ndarray:

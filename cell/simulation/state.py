@@ -1,120 +1,128 @@
-"""Save and restore all state of a run: continuing from a restored state is bit-identical."""
+"""Save and restore all state of a run: continuing from a restored state is bit-identical.
+
+A saved state is a flat mapping of names to arrays. It also says what it is of: product,
+configuration and Drake's version; a state of another cell is refused.
+"""
 
 from __future__ import annotations
 
-import ast
+import hashlib
+import json
 from collections.abc import Mapping
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
+from zipfile import BadZipFile
 
 import numpy as np
 
-from cell.simulation.events import press_into_bed
+from cell.builder import Cell
+from cell.errors import InputError
 from cell.simulation.simulation import Simulation
-from cell.workpieces.thread import ThreadState
 
 State = dict[str, np.ndarray]
 
 
 def save_state(simulation: Simulation) -> State:
-    """Return time, q, v, commands, drive modes, sleep, threads and jig as named arrays."""
+    """Return everything that the course of a run depends on as named arrays."""
     cell, root, context = simulation.cell, simulation.root, simulation.context
-    state: State = {
+    bodies = [part.body for part in cell.parts]
+    asleep = {part.part.name: np.array(part.asleep(root)) for part in cell.parts}
+    state: dict[str, Any] = {
+        "of": {name: np.array(value) for name, value in _identity(cell).items()},
         "steps": np.array(simulation.steps),
         "q": cell.plant.GetPositions(context).copy(),
         "v": cell.plant.GetVelocities(context).copy(),
-        "rng": np.array(repr(simulation.sensor.rng.bit_generator.state)),
+        "drive": {name: drive.save(root) for name, drive in cell.drives.items()},
+        # Drake derives readings from the step that led here.
+        "wrist": {name: reading.copy() for name, reading in simulation.wrists.items()},
+        "tare": {name: reading.copy() for name, reading in simulation.tare.items()},
+        "asleep": asleep | {"jig_base": np.array(cell.jig_base.asleep(root))},
+        "sleep": cell.sleeper.save(root, [*bodies, cell.jig_base.body]),
+        "threads": cell.threads.save(root),
+        "fixture": cell.fixture.save(root),
     }
-    for name, drive in _drives(simulation).items():
-        state[f"{name}/target"], state[f"{name}/effort"] = drive.values(root)
-    for name, arm in cell.arms.items():
-        state[f"{name}/torque_drive"] = np.array(arm.in_torque_drive())
-        # The latest readings, too: Drake derives them from the step that led here.
-        state[f"{name}/wrist"] = simulation.wrists[name].copy()
-        state[f"{name}/tare"] = simulation.tare[name].copy()
-    state["jig_base/asleep"] = np.array(cell.jig_base.asleep)
-    for part in cell.parts:
-        state[f"asleep/{part.part.name}"] = np.array(part.asleep)
-        state[f"pressing/{part.part.name}"] = np.array(part.body in cell.soft_jig.pressing)
-    for name, thread in cell.threads.items():
-        state[f"thread/{name}/state"] = np.array(thread.state.value)
-        state[f"thread/{name}/caught_angle"] = np.array(thread.caught_angle)
-        bit = -1 if thread.bit_position is None else thread.bit_position
-        state[f"thread/{name}/bit"] = np.array(bit)
-    state.update(_flat(cell.soft_jig.save_state(), "jig"))
-    return state
+    return _flat(state)
 
 
-def _flat(nested: Mapping[str, Any], prefix: str) -> State:
-    """Return nested dictionaries as one, with paths for names."""
-    flat: State = {}
-    for name, value in nested.items():
-        path = f"{prefix}/{name}"
-        flat.update(_flat(value, path) if isinstance(value, Mapping) else {path: np.array(value)})
-    return flat
+def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
+    """Put a simulation of the same cell into a saved state.
+
+    Raises:
+        InputError: A state of another product, configuration or Drake, or an incomplete one.
+    """
+    nested = _nested(state)
+    _check_identity(simulation.cell, nested.get("of", {}))
+    try:
+        _restore(simulation, nested)
+    except KeyError as missing:
+        raise InputError(f"The saved state lacks {missing}: it is incomplete.") from missing
 
 
-def _nested(flat: State, prefix: str) -> dict[str, Any]:
-    """Undo `_flat` for the names under a prefix."""
-    nested: dict[str, Any] = {}
-    for path, value in flat.items():
-        if path.startswith(f"{prefix}/"):
-            *folders, name = path.split("/")[1:]
-            here = nested
-            for folder in folders:
-                here = here.setdefault(folder, {})
-            here[name] = value
-    return nested
-
-
-def restore_state(simulation: Simulation, state: State) -> None:
-    """Put a simulation of the same cell into a saved state."""
+def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     cell, root, context = simulation.cell, simulation.root, simulation.context
-    for name, thread in cell.threads.items():
-        thread.restore(
-            root,
-            ThreadState(str(state[f"thread/{name}/state"])),
-            None if state[f"thread/{name}/bit"] < 0 else int(state[f"thread/{name}/bit"]),
-            float(state[f"thread/{name}/caught_angle"]),
-        )
+    # Sleep is restored in the end; what was asleep before must not keep its locks and filters.
+    cell.parts.sleep_all_but(root, [part.part.name for part in cell.parts])
     cell.jig_base.wake(root)
+    cell.threads.restore(root, state["threads"])
+    cell.fixture.restore(root, state.get("fixture", {}))
     for part in cell.parts:
-        part.wake(root)
-        if state[f"pressing/{part.part.name}"]:
-            press_into_bed(simulation, part.part.name)
-        else:
-            cell.soft_jig.release(part.body)
-    cell.soft_jig.restore_state(root, _nested(state, "jig"))
-    simulation.apply_bed_forces()
-    for part in cell.parts:
-        if state[f"asleep/{part.part.name}"]:
-            part.sleep(root)
-    if state["jig_base/asleep"]:
+        if state["asleep"][part.part.name]:
+            cell.parts.sleep(root, part.part.name)
+    if state["asleep"]["jig_base"]:
         cell.jig_base.sleep(root)
-    for name, arm in cell.arms.items():
-        simulation.wrists[name] = state[f"{name}/wrist"]
-        simulation.tare[name] = state[f"{name}/tare"]
-        (arm.use_torque_drive if state[f"{name}/torque_drive"] else arm.use_position_drive)()
-    for name, drive in _drives(simulation).items():
-        target, effort = state[f"{name}/target"], state[f"{name}/effort"]
-        drive.set_target(root, *np.split(target, 2))
-        drive.set_effort(root, effort)
+    for name, drive in cell.drives.items():
+        drive.restore(root, state["drive"][name])
+    simulation.wrists = {name: reading.copy() for name, reading in state["wrist"].items()}
+    simulation.tare = {name: reading.copy() for name, reading in state["tare"].items()}
     simulation.steps = int(state["steps"])
+    cell.sleeper.restore(root, state.get("sleep", {}), simulation.time)
     root.SetTime(simulation.time)
+    cell.monitor.counter.set_seen(root, simulation.steps)
     cell.plant.SetPositions(context, state["q"])
     cell.plant.SetVelocities(context, state["v"])
-    simulation.sensor.rng.bit_generator.state = _literal(str(state["rng"]))
     simulation.simulator.Initialize()
 
 
-def _literal(text: str) -> Any:
-    """Read back the generator state, a dictionary of numbers and names."""
-    return ast.literal_eval(text)
+def _identity(cell: Cell) -> dict[str, str]:
+    """Return what a saved state holds for: product, configuration, Drake's version."""
+    text = json.dumps(cell.config.to_dict(), sort_keys=True, default=str)
+    return {
+        "product": cell.product.name,
+        "configuration": hashlib.sha256(text.encode()).hexdigest()[:16],
+        "Drake": version("drake"),
+    }
 
 
-def _drives(simulation: Simulation) -> dict[str, Any]:
-    cell = simulation.cell
-    return {**cell.drives, "gripper": cell.gripper.drive, "driver": cell.driver.drive}
+def _check_identity(cell: Cell, saved: Mapping[str, Any]) -> None:
+    for what, now in _identity(cell).items():
+        then = str(saved.get(what, "unknown"))
+        if then != now:
+            raise InputError(f"The saved state is of another {what}: {then}, not {now}.")
+
+
+def _flat(nested: Mapping[str, Any], prefix: str = "") -> State:
+    """Return nested dictionaries as one, with paths for names."""
+    flat: State = {}
+    for name, value in nested.items():
+        path = f"{prefix}{name}"
+        if isinstance(value, Mapping):
+            flat.update(_flat(value, f"{path}/"))
+        else:
+            flat[path] = np.array(value)
+    return flat
+
+
+def _nested(flat: Mapping[str, np.ndarray]) -> dict[str, Any]:
+    """Undo `_flat`."""
+    nested: dict[str, Any] = {}
+    for path, value in flat.items():
+        *folders, name = path.split("/")
+        here = nested
+        for folder in folders:
+            here = here.setdefault(folder, {})
+        here[name] = value
+    return nested
 
 
 def write_state(path: Path, state: State) -> None:
@@ -123,6 +131,15 @@ def write_state(path: Path, state: State) -> None:
 
 
 def read_state(path: Path) -> State:
-    """Read a saved state from an npz."""
-    with np.load(path) as archive:
-        return {name: archive[name] for name in archive.files}
+    """Read a saved state from an npz.
+
+    Raises:
+        InputError: There is none, or it cannot be read.
+    """
+    try:
+        with np.load(path) as archive:
+            return {name: archive[name] for name in archive.files}
+    except FileNotFoundError:
+        raise InputError(f"There is no saved state '{path}'.") from None
+    except (OSError, ValueError, BadZipFile) as error:
+        raise InputError(f"'{path}' is not a saved state: {error}.") from error

@@ -8,25 +8,28 @@ force.
 Three more ball constraints tie the bolt to the bit while it is engaged. Both ties are gated: the
 measured axial, lateral, tilt and phase errors must be small first, so nothing is pulled into place.
 
+When they close and open is decided in `cell.workpieces.threads`.
+
 Head friction, seating, the clamped stack and the reaction of both arms are plain contact. Thread
 friction is lumped into the head's friction coefficient, computed from the nut factor K.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
 from pydrake.geometry import (
     CollisionFilterDeclaration,
+    GeometryId,
     GeometrySet,
+    ProximityProperties,
+    RoleAssign,
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     Frame,
@@ -38,7 +41,8 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context
 
-from cell.products.product import Fastener
+from cell.errors import BadPart
+from cell.products.joints import Screw, head_friction
 
 # Ball constraints must sit at about the bolt's radius of gyration: there they are stiffest
 # (measured in Drake: 3.7e6 N/m at 3 mm against 4e5 at 10 mm for a 1.2 g bolt at 1 ms) [M].
@@ -111,71 +115,71 @@ class Misfit:
 
 
 class ThreadState(Enum):
-    """FREE: loose. CAUGHT: follows the helix. LOCKED: tightened, does not turn any more."""
+    """FREE: loose. CAUGHT: follows the helix. LOCKED: caught, and held by static friction."""
 
     FREE = "free"
     CAUGHT = "caught"
     LOCKED = "locked"
 
 
-@dataclass
+STATES = tuple(ThreadState)
+NO_BIT = -1  # Hex position of a bit that is not in the socket.
+
+
+@dataclass(frozen=True)
+class Engagement:
+    """What is remembered of one thread; a row of the state of `cell.workpieces.threads.Threads`.
+
+    Attributes:
+        state: Of the thread.
+        bit_position: In which of its six ways the bit is in the socket, or `NO_BIT`.
+        caught_angle: Angle of the follower when the thread caught [rad].
+    """
+
+    state: ThreadState = ThreadState.FREE
+    bit_position: int = NO_BIT
+    caught_angle: float = 0.0
+
+    def row(self) -> np.ndarray:
+        """Return the row (3,)."""
+        return np.array([STATES.index(self.state), self.bit_position, self.caught_angle])
+
+    @staticmethod
+    def of(row: np.ndarray) -> Engagement:
+        """Undo `row`."""
+        return Engagement(STATES[int(row[0])], int(row[1]), float(row[2]))
+
+
+@dataclass(frozen=True)
 class Thread:
-    """One bolt, its tapped hole and the bit that drives it.
+    """One bolt and its tapped hole in the plant, and the ties that can be closed.
 
     Frames: H is the thread frame, where the bolt's frame F is when it is seated; E is the frame
     of the bit's end face.
     """
 
-    fastener: Fastener
+    screw: Screw
     plant: MultibodyPlant
     scene_graph: SceneGraph
     bolt: RigidBody
     follower: RigidBody
-    screw: ScrewJoint
+    joint: ScrewJoint
     thread_frame: Frame
     bit_frame: Frame
     thread_tie: tuple[MultibodyConstraintId, ...]
     bit_ties: tuple[tuple[MultibodyConstraintId, ...], ...]
-    state: ThreadState = ThreadState.FREE
-    bit_position: int | None = None
-    caught_angle: float = 0.0
-    filters_lifted: Callable[[Context], AbstractContextManager[None]] = nullcontext
-
-    def reset(self, root: Context) -> None:
-        """Make the bolt loose: ties open, follower locked, its own inertia, contact all over."""
-        context = self.plant.GetMyMutableContextFromRoot(root)
-        self._set_inertia(context, engaged=False)
-        self._filter_shank(root, caught=False)
-        for tie in (self.thread_tie, *self.bit_ties):
-            self._tie(context, tie, active=False)
-        self.screw.Lock(context)
-        self.state, self.bit_position = ThreadState.FREE, None
-
-    def restore(
-        self, root: Context, state: ThreadState, bit_position: int | None, caught_angle: float
-    ) -> None:
-        """Return to a saved state; the positions are restored with the plant's."""
-        self.reset(root)
-        context = self.plant.GetMyMutableContextFromRoot(root)
-        self.state, self.bit_position, self.caught_angle = state, bit_position, caught_angle
-        if state is not ThreadState.FREE:
-            self._set_inertia(context, engaged=True)
-            self._tie(context, self.thread_tie, active=True)
-            self._filter_shank(root, caught=True)
-        if state is ThreadState.CAUGHT:
-            self.screw.Unlock(context)
-        if bit_position is not None:
-            self._tie(context, self.bit_ties[bit_position], active=True)
-
-    def _tie(
-        self, context: Context, tie: tuple[MultibodyConstraintId, ...], *, active: bool
-    ) -> None:
-        for constraint in tie:
-            self.plant.SetConstraintActiveStatus(context, constraint, active)
 
     def X_HF(self, context: Context) -> RigidTransform:
         """Pose of the bolt in its thread frame (plant context)."""
         return self.bolt.body_frame().CalcPose(context, self.thread_frame)
+
+    def clamp_force(self, plant_context: Context) -> float:
+        """Axial force that the thread carries, positive when it clamps [N].
+
+        A clamped bolt is pulled into the hole, along -z of the joint frame.
+        """
+        forces = self.plant.get_reaction_forces_output_port().Eval(plant_context)
+        return -float(forces[int(self.joint.index())].translational()[2])
 
     def bit_misfit(self, context: Context) -> tuple[Misfit, int]:
         """Return the error between bit and socket, for the nearest of the six hex positions."""
@@ -187,57 +191,40 @@ class Thread:
         position = int(np.argmin([abs(fit.angle) for fit in fits]))
         return fits[position], position
 
-    def try_engage_bit(self, root: Context) -> bool:
-        """Tie the bit to the bolt if it is inside the socket; return whether it is tied."""
-        if self.bit_position is None:
-            context = self.plant.GetMyMutableContextFromRoot(root)
-            misfit, position = self.bit_misfit(context)
-            if misfit.within(BIT_GATE):
-                self._tie(context, self.bit_ties[position], active=True)
-                self.bit_position = position
-        return self.bit_position is not None
-
-    def release_bit(self, root: Context) -> None:
-        """Pull the bit out of the socket."""
-        if self.bit_position is not None:
-            context = self.plant.GetMyMutableContextFromRoot(root)
-            self._tie(context, self.bit_ties[self.bit_position], active=False)
-            self.bit_position = None
-
     def thread_misfit(self, context: Context) -> tuple[Misfit, float]:
         """Return the bolt's error against the helix, and the follower angle that fits best."""
-        X_HF = self.X_HF(context)
-        free = Misfit.between(X_HF)
-        pitch = self.fastener.pitch
+        free = Misfit.between(self.X_HF(context))
+        pitch = self.screw.pitch
         turns = round((free.axial - pitch * free.angle / (2 * np.pi)) / pitch)
         theta = free.angle + 2 * np.pi * turns
         axial = free.axial - pitch * theta / (2 * np.pi)
         return Misfit(axial, free.lateral, free.tilt, 0.0), theta
 
-    def try_catch(self, root: Context) -> bool:
-        """Let the thread catch if the turning bolt meets it; return whether it is caught."""
-        if self.state is not ThreadState.FREE:
-            return True
-        if self.bit_position is None:
-            return False
+    def apply(self, root: Context, engagement: Engagement) -> None:
+        """Close and open ties, joint and contact as a state asks for."""
         context = self.plant.GetMyMutableContextFromRoot(root)
-        misfit, theta = self.thread_misfit(context)
-        if misfit.within(THREAD_GATE):
-            self._catch(root, context, theta)
-        return self.state is not ThreadState.FREE
+        caught = engagement.state is not ThreadState.FREE
+        self._set_inertia(context, engaged=caught)
+        self._filter_shank(root, caught=caught)
+        for constraint in self.thread_tie:
+            self.plant.SetConstraintActiveStatus(context, constraint, caught)
+        self.set_bit(root, engagement.bit_position)
+        turns = engagement.state is ThreadState.CAUGHT
+        (self.joint.Unlock if turns else self.joint.Lock)(context)
 
-    def _catch(self, root: Context, context: Context, theta: float) -> None:
-        self.screw.Unlock(context)
-        self.plant.SetPositions(context, self._with_theta(context, theta))
-        self._set_inertia(context, engaged=True)
-        self._tie(context, self.thread_tie, active=True)
-        self._filter_shank(root, caught=True)
-        self.state, self.caught_angle = ThreadState.CAUGHT, theta
+    def set_bit(self, root: Context, position: int) -> None:
+        """Tie the bit in one of its hex positions; `NO_BIT` opens all ties."""
+        context = self.plant.GetMyMutableContextFromRoot(root)
+        for k, tie in enumerate(self.bit_ties):
+            for constraint in tie:
+                self.plant.SetConstraintActiveStatus(context, constraint, k == position)
 
-    def _with_theta(self, context: Context, theta: float) -> np.ndarray:
+    def set_angle(self, root: Context, theta: float) -> None:
+        """Turn the follower, without load, to an angle [rad]."""
+        context = self.plant.GetMyMutableContextFromRoot(root)
         q = self.plant.GetPositions(context).copy()
-        q[self.screw.position_start()] = theta
-        return q
+        q[self.joint.position_start()] = theta
+        self.plant.SetPositions(context, q)
 
     def _set_inertia(self, context: Context, *, engaged: bool) -> None:
         """Real inertia while loose; added inertia while the thread is engaged."""
@@ -256,26 +243,8 @@ class Thread:
         parent = self.plant.GetCollisionGeometriesForBody(self.thread_frame.body())
         declaration = CollisionFilterDeclaration()
         declare = declaration.ExcludeBetween if caught else declaration.AllowBetween
-        declare(GeometrySet(bolt), GeometrySet(parent))
-        with self.filters_lifted(root):
-            self.scene_graph.collision_filter_manager(context).Apply(declaration)
-
-    def lock(self, root: Context) -> None:
-        """The clutch has tripped: from now on static thread friction holds the bolt."""
-        self.screw.Lock(self.plant.GetMyMutableContextFromRoot(root))
-        self.state = ThreadState.LOCKED
-
-    def turns(self, context: Context) -> float:
-        """Turns since the thread caught, positive for tightening."""
-        return (self.caught_angle - self.screw.get_rotation(context)) / (2 * np.pi)
-
-    def clamp_force(self, plant_context: Context) -> float:
-        """Axial force that the thread carries, positive when it clamps [N].
-
-        A clamped bolt is pulled into the hole, along -z of the joint frame.
-        """
-        forces = self.plant.get_reaction_forces_output_port().Eval(plant_context)
-        return -float(forces[int(self.screw.index())].translational()[2])
+        filters = self.scene_graph.collision_filter_manager(context)
+        filters.Apply(declare(GeometrySet(bolt), GeometrySet(parent)))
 
 
 def _X_FE_seated(position: int) -> RigidTransform:
@@ -291,27 +260,60 @@ def _tie_points(z: float) -> list[np.ndarray]:
     ]
 
 
+def set_head_friction(
+    plant: MultibodyPlant, scene_graph: SceneGraph, screw: Screw, bolt: RigidBody, clamps: RigidBody
+) -> None:
+    """Give a bolt's head the friction of its nut factor, before the plant is finalized.
+
+    The head is the geometry "head" of the bolt's model; what it bears on are the geometries
+    "washer..." of the clamped part, where there are such.
+
+    Raises:
+        BadPart: The bolt's model has no geometry "head".
+    """
+    inspector = scene_graph.model_inspector()
+
+    def named(body: RigidBody, prefix: str) -> list[GeometryId]:
+        ids = plant.GetCollisionGeometriesForBody(body)
+        return [i for i in ids if inspector.GetName(i).split("::")[-1].startswith(prefix)]
+
+    heads, washers = named(bolt, "head"), named(clamps, "washer")
+    if not heads:
+        raise BadPart(screw.part, "its model has no collision geometry 'head' for the bolt's head")
+    counter = None
+    if washers:
+        properties = inspector.GetProximityProperties(washers[0])
+        counter = properties.GetProperty("material", "coulomb_friction").static_friction()
+    friction = head_friction(screw, counter)
+    for head in heads:
+        properties = ProximityProperties(inspector.GetProximityProperties(head))
+        material = CoulombFriction(friction, friction)
+        properties.UpdateProperty("material", "coulomb_friction", material)
+        source = plant.get_source_id()
+        scene_graph.AssignRole(source, head, properties, RoleAssign.kReplace)
+
+
 def add_thread(
     plant: MultibodyPlant,
     scene_graph: SceneGraph,
-    fastener: Fastener,
+    screw: Screw,
     bolt: RigidBody,
     into: RigidBody,
     X_IH: RigidTransform,
     bit_frame: Frame,
 ) -> Thread:
-    """Add the follower and the (open) ties of one fastener, before the plant is finalized.
+    """Add the follower and the (open) ties of one screw, before the plant is finalized.
 
     Args:
         plant: Not finalized yet.
         scene_graph: Where collision filters are set.
-        fastener: Pitch and names.
+        screw: Pitch and names.
         bolt: The bolt; its z axis points from the shank to the head.
         into: The part that carries the thread.
         X_IH: Thread frame H in the frame of ``into``: the bolt's pose when seated.
         bit_frame: Frame E at the bit's end face, +z out of the tool.
     """
-    name = f"thread_{fastener.part}"
+    name = f"thread_{screw.part}"
     H = plant.AddFrame(FixedOffsetFrame(name, into.body_frame(), X_IH))
     unit = FOLLOWER_INERTIA / FOLLOWER_MASS
     follower = plant.AddRigidBody(
@@ -320,8 +322,8 @@ def add_thread(
         SpatialInertia(FOLLOWER_MASS, np.zeros(3), UnitInertia(unit, unit, unit)),
     )
     # Right-hand thread: a positive rotation about +z (out of the hole) moves out of the hole.
-    screw = plant.AddJoint(
-        ScrewJoint(name, H, follower.body_frame(), np.array([0.0, 0.0, 1.0]), fastener.pitch, 0.0)
+    joint = plant.AddJoint(
+        ScrewJoint(name, H, follower.body_frame(), np.array([0.0, 0.0, 1.0]), screw.pitch, 0.0)
     )
     thread_tie = tuple(
         plant.AddBallConstraint(follower, point, bolt, point) for point in _tie_points(0.0)
@@ -339,5 +341,5 @@ def add_thread(
         for position in range(HEX_POSITIONS)
     )
     return Thread(
-        fastener, plant, scene_graph, bolt, follower, screw, H, bit_frame, thread_tie, bit_ties
+        screw, plant, scene_graph, bolt, follower, joint, H, bit_frame, thread_tie, bit_ties
     )

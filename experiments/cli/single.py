@@ -12,13 +12,14 @@ from typing import Annotated
 import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
-from cell.errors import CellError
+from cell.errors import InputError
 from cell.products.loading import load_product
 from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import split_order
 from experiments.reporting.output import output_folder
+from planning.operations.operation import Operation
 
 
 @dataclass(frozen=True)
@@ -31,28 +32,36 @@ class Options:
     """Go on from the state.npz of an earlier run with the same product, order and seed."""
 
 
-def run_operation(
-    command: str, last: str, description: str | None, arguments: Sequence[str] | None = None
+def run_script(
+    last: Operation,
+    command: str,
+    description: str | None,
+    arguments: Sequence[str] | None = None,
 ) -> int:
-    """Run the plan of a product up to an operation; return the exit code.
+    """Run the script of an operation: the plan of a product up to it; return the exit code.
 
     Args:
+        last: The operation after whose first step to stop.
         command: Name of the script, for the record.
-        last: Kind of the last operation to run.
         description: For ``--help``.
         arguments: Command line; None: that of the process.
     """
+    options = tyro.cli(
+        Options, args=arguments, description=description, config=(FlagCreatePairsOff,)
+    )
     try:
-        options = tyro.cli(
-            Options, args=arguments, description=description, config=(FlagCreatePairsOff,)
-        )
-        return _run(options, command, last)
-    except CellError as error:
+        return run_up_to(last, command, options)
+    except InputError as error:
         print(f"{command}: {error}", file=sys.stderr)
         return 2
 
 
-def _run(options: Options, command: str, last: str) -> int:
+def run_up_to(last: Operation, command: str, options: Options) -> int:
+    """Run the plan of a product up to an operation; return 0 for success, else 1.
+
+    Raises:
+        InputError: Something that was given cannot be used.
+    """
     wanted, common = options.assemble, options.assemble.common
     config = common.load_config()
     with contextlib.ExitStack() as folders:

@@ -7,11 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
-# The four screws that clamp the membrane, at 90 degrees [S], on the circle midway between the
-# aperture and the rim, in J; numbered so that p_2 - p_c is x and p_1 - p_c is y of the jig.
-SCREW_RADIUS = (0.0583 + 0.080) / 2  # [D]
-SCREWS = SCREW_RADIUS * np.array([[0, 1, 0], [1, 0, 0], [0, -1, 0], [-1, 0, 0]], dtype=float)
-JIG_WIDTH = 0.160  # [m] [S] what pixels are converted with.
+from cell.fixtures.jig_dimensions import BASE_DIAMETER, SCREW_CIRCLE_RADIUS
+
+# The four screws that clamp the membrane, at 90 degrees [S], in J; numbered so that p_2 - p_c is x
+# and p_1 - p_c is y of the jig.
+SCREWS = SCREW_CIRCLE_RADIUS * np.array([[0, 1, 0], [1, 0, 0], [0, -1, 0], [-1, 0, 0]], dtype=float)
 
 
 @dataclass(frozen=True)
@@ -45,9 +45,9 @@ def clicked(camera: Camera, X_WJ: RigidTransform) -> np.ndarray:
 
 def metres_per_pixel(camera: Camera, X_WJ: RigidTransform) -> float:
     """Return the scale by the known width of the jig in the first picture."""
-    edge = 0.5 * JIG_WIDTH * np.array([[1.0, 0, 0], [-1.0, 0, 0]])
+    edge = 0.5 * BASE_DIAMETER * np.array([[1.0, 0, 0], [-1.0, 0, 0]])
     ends = camera.pixels((X_WJ @ edge.T).T)
-    return JIG_WIDTH / float(np.linalg.norm(ends[0] - ends[1]))
+    return BASE_DIAMETER / float(np.linalg.norm(ends[0] - ends[1]))
 
 
 def seen_displacement(before: RigidTransform, after: RigidTransform) -> tuple[float, float]:

@@ -146,7 +146,6 @@ def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, C
             cases,
             product=load_product("motor_unit"),
             config=config,
-            bed="soft",
             trials=suite.trials,
             seed=SEED,
         )

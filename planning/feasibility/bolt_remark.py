@@ -52,8 +52,8 @@ class BoltRemark:
 def bolt_remarks(product: Product, solids: Mapping[str, Solid]) -> list[BoltRemark]:
     """Return the check for every part that is clamped by bolts."""
     carried: dict[str, list[str]] = {}
-    for name, fastener in product.fasteners.items():
-        carried.setdefault(fastener.clamps, []).append(name)
+    for name, screw in product.screws.items():
+        carried.setdefault(screw.clamps, []).append(name)
     return [
         BoltRemark(
             part,

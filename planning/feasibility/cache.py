@@ -1,7 +1,7 @@
 """Cache of matrices, keyed by content: planning the same parts again only reads a file.
 
 The key is a digest of everything that determines the matrices: vertices and faces of every part in
-the product frame, declared fasteners and tolerance, and this package's own source, so that a new
+the product frame, declared screws and tolerance, and this package's own source, so that a new
 version never reads results of an old one. A file that cannot be read counts as absent.
 """
 
@@ -49,7 +49,7 @@ def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> 
 def key_of(product: Product, solids: Mapping[str, Solid], tolerance: float | None) -> str:
     """Return a digest of everything that determines the matrices of a product."""
     digest = hashlib.blake2b(_source_digest(), digest_size=20)
-    pairs = sorted((f.part, f.into, f.pitch) for f in product.fasteners.values())
+    pairs = sorted((f.part, f.into, f.pitch) for f in product.screws.values())
     digest.update(json.dumps([tolerance, pairs]).encode())
     for name, solid in solids.items():
         digest.update(f"{name} {solid.vertices.shape} {solid.faces.shape}".encode())

@@ -43,7 +43,7 @@ def without_overlaps(
     """Return the solids with each bolt's thread cut out of the part it is driven into.
 
     Args:
-        product: For its declared fasteners.
+        product: For its declared screws.
         solids: Parts by name.
         tolerance: Thickness of overlap that does not count [m].
         suspects: Pairs to check; all of them by default. Two parts of which one can leave the other
@@ -81,8 +81,8 @@ def _declared(
 ) -> tuple[str, str] | None:
     """Return (bolt, nut) if the product says that one of two parts is driven into the other."""
     for bolt, nut in ((a, b), (b, a)):
-        fastener = product.fasteners.get(bolt)
-        if fastener is not None and fastener.into == nut:
-            deepest = THREAD_HEIGHT_PER_PITCH * fastener.pitch + tolerance
+        screw = product.screws.get(bolt)
+        if screw is not None and screw.into == nut:
+            deepest = THREAD_HEIGHT_PER_PITCH * screw.pitch + tolerance
             return (bolt, nut) if depth <= deepest else None
     return None

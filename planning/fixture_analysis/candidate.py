@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
-from cell.cad.hand_e import STROKE as FINGER_STROKE
 from cell.configuration.config import CellConfig
+from cell.errors import InputError
 from cell.fixtures.soft_jig import JigParameters
+from cell.machines.grippers import GRIPPER_MODELS
 from planning.feasibility.directions import axis_index
 
 CRITERIA: Mapping[str, str] = {
@@ -33,23 +34,33 @@ class FixtureSetup:
         press_force: Force with which a body is pressed into the jig [N].
         insertion_force: Largest force along an insertion [N].
         driver_force: Thrust of the screwdriver [N].
-        gripper_stroke: Largest opening of the gripper [m].
+        gripper_stroke: Largest opening of the gripper, or of the widest one [m].
     """
 
     jig: JigParameters
     press_force: float
     insertion_force: float
     driver_force: float
-    gripper_stroke: float = 2.0 * FINGER_STROKE  # Both fingers.
+    gripper_stroke: float
 
     @staticmethod
     def of(config: CellConfig) -> FixtureSetup:
-        """Return the setup that a configuration describes."""
+        """Return the setup that a configuration describes.
+
+        Raises:
+            InputError: No arm carries a gripper.
+        """
+        tools = [arm.tool for arm in config.arms.values()]
+        strokes = [GRIPPER_MODELS[tool].stroke for tool in tools if tool in GRIPPER_MODELS]
+        if not strokes:
+            known = ", ".join(GRIPPER_MODELS)
+            raise InputError(f"No arm carries a gripper; set arms.NAME.tool to one of {known}.")
         return FixtureSetup(
             config.jig,
             config.placement.press_force,
             config.insertion.force_limit,
             config.driver.push_force,
+            max(strokes),
         )
 
 

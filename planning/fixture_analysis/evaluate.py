@@ -223,11 +223,11 @@ class _Evaluation:
 
     def _engagement(self, name: str) -> float:
         """Return how far a bolt that is only inserted may protrude and still be in its hole [m]."""
-        fastener, body = self.shared.product.fasteners.get(name), self.proposal.body
-        if fastener is None or fastener.into in body or fastener.clamps not in body:
+        screw, body = self.shared.product.screws.get(name), self.proposal.body
+        if screw is None or screw.into in body or screw.clamps not in body:
             return 0.0
         axis = unit_vector(self.proposal.up)
-        bolt, held = (self.solids[n].vertices @ axis for n in (name, fastener.clamps))
+        bolt, held = (self.solids[n].vertices @ axis for n in (name, screw.clamps))
         return float(min(bolt.max(), held.max()) - max(bolt.min(), held.min()))
 
     def _tilt(self, imprint: Imprint) -> float:

@@ -50,7 +50,7 @@ def operation_load(
     """Return the load on the body while one piece is brought to it.
 
     Args:
-        product: For its fits and fasteners.
+        product: For its fits and screws.
         solids: Parts by name.
         setup: Forces of the operations.
         proposal: What is on the jig, and in which posture.
@@ -59,10 +59,10 @@ def operation_load(
         low: Height of the body's lowest point, turned [m].
     """
     R_JA = rotation_with_up(proposal.up).matrix()
-    fasteners = [product.fasteners[n] for n in piece if n in product.fasteners]
-    driven = len(fasteners) == len(piece) and all(f.into in proposal.body for f in fasteners)
+    screws = [product.screws[n] for n in piece if n in product.screws]
+    driven = len(screws) == len(piece) and all(f.into in proposal.body for f in screws)
     force = setup.driver_force if driven else setup.insertion_force
-    torque = max((f.torque for f in fasteners), default=0.0) if driven else 0.0
+    torque = max((f.torque for f in screws), default=0.0) if driven else 0.0
     p_JQ = R_JA @ mating_point(product, solids, proposal, piece)
     p_Q, height = p_JQ[:2] - p_middle, max(float(p_JQ[2]) - low, 1e-3)
     if proposal.approach == "above":

@@ -39,7 +39,7 @@ def general_rule(
     """Evaluate and rank the candidates of every step of a plan.
 
     Args:
-        product: With grasps, fits and fasteners as far as they are known.
+        product: With grasps, fits and screws as far as they are known.
         order: Items in the order of assembly.
         steps: What Algorithm 1 chose for this order.
         matrices: Of the product.

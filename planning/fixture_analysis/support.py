@@ -19,7 +19,7 @@ class SupportAnalysis:
     """Connected pieces and unsupported parts of a product, from its matrices.
 
     Attributes:
-        product: For its fasteners.
+        product: For its screws.
         matrices: Contact, interference and shapes.
         pieces: Cache of ``components``: every posture of a step needs those of the same sets.
     """
@@ -75,7 +75,7 @@ class SupportAnalysis:
         place = {name: number for number, name in enumerate(body)}
         joined = np.zeros((len(body), len(body)), bool)
         for bolt in body:
-            fastener = self.product.fasteners.get(bolt)
-            if fastener and fastener.into in place and fastener.clamps in place:
-                joined[place[bolt], [place[fastener.into], place[fastener.clamps]]] = True
+            screw = self.product.screws.get(bolt)
+            if screw and screw.into in place and screw.clamps in place:
+                joined[place[bolt], [place[screw.into], place[screw.clamps]]] = True
         return joined | joined.T

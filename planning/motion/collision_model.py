@@ -46,9 +46,9 @@ class Surroundings:
     """Everything that stands still, or hangs on the hand, while one arm moves.
 
     Attributes:
-        arms: Joint angles (6,) of each arm that is not the moving one; arms left out are at home.
+        arms: Joint angles (dof,) of each arm that is not the moving one; arms left out are at home.
         tools: Joint positions of each tool by model instance, for example
-            ``{"left_tool": [s/2, s/2]}``; tools left out are at their default.
+            ``{"<arm>_tool": [s/2, s/2]}``; tools left out are at their default.
         X_WP: Pose of each loose part that stands in the cell; parts left out are not there.
         X_HandP: Pose of each held part in the model's hand frame.
         may_touch: Pairs that are not checked: model instances, "held" for what is in the hand,
@@ -74,7 +74,8 @@ class CollisionModel:
             instance and goes by that instance's name.
         arm_clearance: Least distance between robots [m].
         obstacle_clearance: Least distance between a robot and anything that is not one [m].
-        hand: The arm that holds parts and the frame of its tool in which their poses are given.
+        hand: Name of the arm that holds parts, and the frame of its tool in which their poses are
+            given.
     """
 
     def __init__(
@@ -83,7 +84,7 @@ class CollisionModel:
         *,
         arm_clearance: float,
         obstacle_clearance: float,
-        hand: tuple[str, str] = ("left", "tip"),
+        hand: tuple[str, str],
     ) -> None:
         builder = RobotDiagramBuilder()
         self.plant = builder.plant()
@@ -91,7 +92,9 @@ class CollisionModel:
         self._held = _add_held_body(self.plant, self.arms[hand[0]], hand[1])
         self._hand = self.arms[hand[0]]
         self._clearances = (arm_clearance, obstacle_clearance)
-        robots = [index for arm in self.arms.values() for index in (arm.instance, arm.tool)]
+        robots = [
+            index for arm in self.arms.values() for index in (arm.instance, arm.tool_instance)
+        ]
         with _quiet_drake():
             self._checker = SceneGraphCollisionChecker(
                 model=builder.Build(),
@@ -130,7 +133,7 @@ class CollisionModel:
         self._checker.SetPaddingMatrix(self._padding(arm_clearance, obstacle_clearance))
 
     def is_free(self, arm: str, q: np.ndarray) -> bool:
-        """Return whether the arm at ``q`` (6,) keeps its clearances."""
+        """Return whether the arm at ``q`` (dof,) keeps its clearances."""
         return self._checker.CheckConfigCollisionFree(self._full(arm, q))
 
     def is_edge_free(self, arm: str, q_from: np.ndarray, q_to: np.ndarray) -> bool:
@@ -159,7 +162,7 @@ class CollisionModel:
         return full
 
     def _positions(self, surroundings: Surroundings) -> np.ndarray:
-        """Return the positions of the whole plant with both arms where the surroundings say."""
+        """Return the positions of the whole plant with all arms where the surroundings say."""
         plant, context = self.plant, self.plant.CreateDefaultContext()
         for arm in self.arms.values():
             plant.SetPositions(context, arm.instance, surroundings.arms.get(arm.name, arm.home))
@@ -184,7 +187,7 @@ class CollisionModel:
     def _filter_matrix(self, may_touch: Iterable[tuple[str, str]]) -> np.ndarray:
         """Return the checker's filter matrix (1: not checked) with the allowed pairs added."""
         matrix = self._filter.copy()
-        fingers = [int(index) for index in self.plant.GetBodyIndices(self._hand.tool)]
+        fingers = [int(index) for index in self.plant.GetBodyIndices(self._hand.tool_instance)]
         pairs = [(int(self._held.index()), index) for index in fingers]
         for one, other in may_touch:
             pairs += product(self._indices(one), self._indices(other))
@@ -199,7 +202,7 @@ class CollisionModel:
         owner = {
             int(index): arm.name
             for arm in self.arms.values()
-            for instance in (arm.instance, arm.tool)
+            for instance in (arm.instance, arm.tool_instance)
             for index in self.plant.GetBodyIndices(instance)
         }
         padding = np.zeros((self.plant.num_bodies(),) * 2)
@@ -256,7 +259,7 @@ def _quiet_drake() -> Iterator[None]:
 def _add_held_body(plant: MultibodyPlant, arm: Arm, frame: str) -> RigidBody:
     """Add an empty body welded to the hand; the shapes of held parts are hung on it."""
     inertia = SpatialInertia.SolidSphereWithMass(1e-3, 1e-3)  # No dynamics in the planning copy.
-    body = plant.AddRigidBody(HELD, arm.tool, inertia)
+    body = plant.AddRigidBody(HELD, arm.tool_instance, inertia)
     plant.WeldFrames(arm.frame(frame), body.body_frame())
     return body
 

@@ -20,7 +20,7 @@ class JointPath:
     and joins the segments tangentially and stays within r/2 of the corner.
 
     Attributes:
-        waypoints: (n, 6) joint angles [rad], n >= 1, neighbours distinct.
+        waypoints: (n, dof) joint angles [rad], n >= 1, neighbours distinct.
         radii: (n,) [rad]; 0 at both ends.
     """
 
@@ -29,7 +29,7 @@ class JointPath:
 
     @staticmethod
     def through(waypoints: np.ndarray, radius: float) -> JointPath:
-        """Return the path through (n, 6) waypoints with corners rounded by at most ``radius``."""
+        """Return the path through (n, dof) waypoints with corners rounded by at most ``radius``."""
         points = np.atleast_2d(np.asarray(waypoints, dtype=float))
         moved = np.linalg.norm(np.diff(points, axis=0), axis=1) > SAME
         points = points[np.concatenate([[True], moved])]
@@ -62,7 +62,7 @@ class JointPath:
         return PiecewisePolynomial(pieces, breaks)
 
     def samples(self, step: float) -> np.ndarray:
-        """Return (m, 6) points of the curve at most ``step`` [rad] apart, both ends included."""
+        """Return (m, dof) points of the curve at most ``step`` [rad] apart, both ends included."""
         if len(self.waypoints) == 1:
             return self.waypoints
         curve = self.curve()
@@ -77,6 +77,6 @@ def _parabola(p: np.ndarray, u: np.ndarray, w: np.ndarray, r: float) -> np.ndarr
 
 
 def _polynomials(coefficients: list[np.ndarray]) -> np.ndarray:
-    """Return (6, 1) polynomials from coefficients by rising power, each (6,)."""
+    """Return (dof, 1) polynomials from coefficients by rising power, each (dof,)."""
     columns = np.stack(coefficients, axis=1)
     return np.array([[Polynomial(row)] for row in columns])

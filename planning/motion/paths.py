@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context
 
-from cell.errors import CellError
+from cell.errors import RunFailure
 from cell.machines.arm import Arm
 from planning.motion.collision_model import EDGE_STEP, CollisionModel
 from planning.motion.joint_path import JointPath
@@ -30,7 +30,7 @@ LINE_TURN = 0.05  # The same for its orientation [rad] [A].
 LINE_JUMP = 0.3
 
 
-class NoPath(CellError):
+class NoPath(RunFailure):
     """A motion that was not found, with what is in its way."""
 
     def __init__(self, arm: str, reason: str, evidence: tuple[str, ...] = ()) -> None:
@@ -56,8 +56,8 @@ def plan_path(
     Args:
         model: The planning copy of the cell.
         arm: Name of the arm that moves.
-        q_start: (6,).
-        q_goal: (6,).
+        q_start: (dof,).
+        q_goal: (dof,).
         seed: Of both random searches.
         max_iterations: Of RRT-Connect, per attempt.
     """
@@ -86,7 +86,7 @@ def plan_line(
         arm: The arm.
         context: Plant context; the tool's joints count as they are in it.
         frame: Of the tool.
-        q_start: (6,) where the line begins.
+        q_start: (dof,) where the line begins.
         X_WGoal: Where it ends.
         is_free: Which joint angles are acceptable; None: all.
 
@@ -135,7 +135,7 @@ def _search(
     seed: int,
     max_iterations: int,
 ) -> np.ndarray:
-    """Return (n, 6) waypoints found by RRT-Connect, near the endpoints if possible."""
+    """Return (n, dof) waypoints found by RRT-Connect, near the endpoints if possible."""
     limits = joint_limits(model.arms[arm])
     ends = np.array([q_start, q_goal])
     for margin in (NEIGHBOURHOOD, np.inf):
@@ -159,14 +159,15 @@ def _rrt_connect(
     """Run OMPL's planner, which stops after a number of iterations and never by the clock."""
     ou.setLogLevel(ou.LogLevel.LOG_NONE)
     ou.RNG.setSeed(seed + 1)  # Zero would be ignored.
-    space = ob.RealVectorStateSpace(6)
-    box = ob.RealVectorBounds(6)
-    for joint in range(6):
+    dof = ends.shape[1]
+    space = ob.RealVectorStateSpace(dof)
+    box = ob.RealVectorBounds(dof)
+    for joint in range(dof):
         box.setLow(joint, float(bounds[0][joint]))
         box.setHigh(joint, float(bounds[1][joint]))
     space.setBounds(box)
     setup = og.SimpleSetup(space)
-    setup.setStateValidityChecker(lambda state: is_free(_values(state)))
+    setup.setStateValidityChecker(lambda state: is_free(_values(state, dof)))
     information = setup.getSpaceInformation()
     information.setStateValidityCheckingResolution(EDGE_STEP / space.getMaximumExtent())
     setup.setPlanner(og.RRTConnect(information))
@@ -174,18 +175,18 @@ def _rrt_connect(
     setup.solve(_after(max_iterations))
     if not setup.haveExactSolutionPath():
         return None
-    return np.array([_values(state) for state in setup.getSolutionPath().getStates()])
+    return np.array([_values(state, dof) for state in setup.getSolutionPath().getStates()])
 
 
 # OMPL's type information leaves out that states of a real vector space are indexable.
-def _values(state: Any) -> np.ndarray:
-    return np.array([state[joint] for joint in range(6)])
+def _values(state: Any, dof: int) -> np.ndarray:
+    return np.array([state[joint] for joint in range(dof)])
 
 
 def _state(space: ob.RealVectorStateSpace, q: np.ndarray) -> ob.State:
     state: Any = space.allocState()
-    for joint in range(6):
-        state[joint] = float(q[joint])
+    for joint, angle in enumerate(q):
+        state[joint] = float(angle)
     return state
 
 

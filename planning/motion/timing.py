@@ -11,7 +11,7 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 
-from cell.errors import CellError
+from cell.errors import RunFailure
 from cell.machines.arm import Arm
 from cell.paths import model_url, new_parser
 from planning.motion.joint_path import JointPath
@@ -22,7 +22,7 @@ SAMPLE_PERIOD = 0.005  # Of the resulting motion [s] [A].
 TORQUE_SHARE = 0.9  # Of the torque limits; the rest is for the feedback [A].
 
 
-class NoTiming(CellError):
+class NoTiming(RunFailure):
     """A path that cannot be run within the limits."""
 
     def __init__(self, arm: str, length: float) -> None:
@@ -38,8 +38,8 @@ class JointMotion:
 
     Attributes:
         time: (n,) rising from 0 [s].
-        q: (n, 6) [rad].
-        v: (n, 6) [rad/s].
+        q: (n, dof) [rad].
+        v: (n, dof) [rad/s].
     """
 
     time: np.ndarray
@@ -52,9 +52,9 @@ class JointMotion:
         return float(self.time[-1])
 
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
-        """Return q and v (6,) each, by cubic interpolation; at rest before the start and after."""
+        """Return q and v (dof,), by cubic interpolation; at rest before the start and after."""
         if not 0.0 < time < self.duration:
-            return self.q[0 if time <= 0.0 < self.duration else -1], np.zeros(6)
+            return self.q[0 if time <= 0.0 < self.duration else -1], np.zeros(self.q.shape[1])
         i = int(np.searchsorted(self.time, time, side="right")) - 1
         h = self.time[i + 1] - self.time[i]
         x = (time - self.time[i]) / h
@@ -84,13 +84,15 @@ def time_path(
         payload: What the tool holds, about and in the flange frame.
     """
     if len(path.waypoints) == 1:
-        return JointMotion(np.zeros(1), path.waypoints, np.zeros((1, 6)))
+        return JointMotion(np.zeros(1), path.waypoints, np.zeros((1, arm.dof)))
     plant = _arm_alone(arm, context, payload)
     curve = path.curve()
     toppra = Toppra(curve, plant, _grid(curve))
     speed = velocity_scale * plant.GetVelocityUpperLimits()
     toppra.AddJointVelocityLimit(-speed, speed)
-    toppra.AddJointAccelerationLimit(*(sign * np.full(6, acceleration_limit) for sign in (-1, 1)))
+    toppra.AddJointAccelerationLimit(
+        *(sign * np.full(arm.dof, acceleration_limit) for sign in (-1, 1))
+    )
     toppra.AddJointTorqueLimit(*(sign * TORQUE_SHARE * arm.effort_limits for sign in (-1, 1)))
     progress = toppra.SolvePathParameterization()
     if progress is None:
@@ -101,20 +103,20 @@ def time_path(
 def _arm_alone(arm: Arm, context: Context, payload: SpatialInertia | None) -> MultibodyPlant:
     """Return the arm with tool and payload as one lump, standing as it does in the cell."""
     plant = MultibodyPlant(time_step=0.0)
-    (instance,) = new_parser(plant).AddModelsFromUrl(model_url("ur5e"))
-    base = plant.GetFrameByName("base_link", instance)
-    X_WB = arm.plant.GetFrameByName("base_link", arm.instance).CalcPoseInWorld(context)
+    (instance,) = new_parser(plant).AddModelsFromUrl(model_url(arm.model.sdf))
+    base = plant.GetFrameByName(arm.model.base_frame, instance)
+    X_WB = arm.plant.GetFrameByName(arm.model.base_frame, arm.instance).CalcPoseInWorld(context)
     plant.WeldFrames(plant.world_frame(), base, X_WB)
     lump = plant.AddRigidBody("lump", instance, _tool_inertia(arm, context, payload))
-    plant.WeldFrames(plant.GetFrameByName("flange", instance), lump.body_frame())
+    plant.WeldFrames(plant.GetFrameByName(arm.model.flange_frame, instance), lump.body_frame())
     plant.Finalize()
     return plant
 
 
 def _tool_inertia(arm: Arm, context: Context, payload: SpatialInertia | None) -> SpatialInertia:
     """Return the spatial inertia of tool and payload about and in the flange frame."""
-    flange = arm.plant.GetFrameByName("flange", arm.instance)
-    bodies = arm.plant.GetBodyIndices(arm.tool)
+    flange = arm.plant.GetFrameByName(arm.model.flange_frame, arm.instance)
+    bodies = arm.plant.GetBodyIndices(arm.tool_instance)
     inertia = arm.plant.CalcSpatialInertia(context, flange, bodies)
     if payload is not None:
         inertia += payload

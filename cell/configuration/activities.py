@@ -1,0 +1,195 @@
+"""Settings of what is done in the cell, and of the errors that it is done with."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from cell.fixtures.jig_dimensions import BEAD_MASS, JIG_MASS
+from cell.setting import setting
+
+
+@dataclass(frozen=True)
+class PlacementConfig:
+    """Pressing a part into the soft bed."""
+
+    press_force: float = setting(
+        20.0, "N", "Downward force that ends the pressing.",
+        "[A] 20, plausible 15-30.",
+        above=0.0, at_most=100.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class PushConfig:
+    """The paper's push experiment: one set of numbers for all cases and both parts."""
+
+    jig_mass: float = setting(
+        JIG_MASS, "kg", "Mass of base and beads; more than the beads alone.",
+        "[A] Not in the paper; plausible 1-3.",
+        above=BEAD_MASS, at_most=20.0,
+    )  # fmt: skip
+    base_friction: float = setting(
+        0.4, "", "Friction of the base on the force plate.",
+        "[A] 0.4, plausible 0.3-0.6.",
+        above=0.0, at_most=2.0,
+    )  # fmt: skip
+    speed: float = setting(
+        0.28, "m/s", "Speed of the hand at the end of the push.",
+        "[D] Coasting by 8 mm past 70 [S] asks for 0.22-0.29.",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    acceleration: float = setting(
+        1.0, "m/s2", "Acceleration of the hand from rest.",
+        "[A] Up to speed in 39 mm of the 70.",
+        above=0.0, at_most=100.0,
+    )  # fmt: skip
+    stroke: float = setting(
+        0.070, "m", "Length of the straight push.",
+        "[S] 70 mm.",
+        above=0.0, at_most=0.15,
+    )  # fmt: skip
+    start_gap: float = setting(
+        2e-3, "m", "Gap between hand and part at the start.",
+        "[A] 2 mm, plausible 0.5-5 mm.",
+        at_least=0.0, at_most=0.02,
+    )  # fmt: skip
+    height_fraction: float = setting(
+        0.6, "", "Height of the fingers' lowest point, relative to the exposed height of the "
+        "pushed face.",
+        "[A] 0.6, plausible 0.5-0.7.",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    bed_clearance: float = setting(
+        2e-3, "m", "Least distance of the fingers from the bed below.",
+        "[A] Own choice.",
+        at_least=0.0, at_most=0.1,
+    )  # fmt: skip
+    grasp_position_sigma: float = setting(
+        5e-4, "m", "Standard deviation of the part's position in the grasp, per axis.",
+        "[A] Own choice.",
+        at_least=0.0, at_most=0.02,
+    )  # fmt: skip
+    grasp_angle_sigma_deg: float = setting(
+        1.0, "deg", "Standard deviation of the part's rotation in the grasp, per axis.",
+        "[A] Own choice.",
+        at_least=0.0, at_most=30.0,
+    )  # fmt: skip
+    jig_position_sigma: float = setting(
+        1e-3, "m", "Standard deviation of the jig's place, along x and y.",
+        "[A] Own choice.",
+        at_least=0.0, at_most=0.05,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class MotionConfig:
+    """Free motion of the arms."""
+
+    velocity_scale: float = setting(
+        0.5, "", "Share of the joint speed limits.",
+        "[M] Slip in the jaws grows with it.",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    acceleration_limit: float = setting(
+        6.0, "rad/s2", "Acceleration limit of every joint.",
+        "[A] Own choice.",
+        above=0.0, at_most=100.0,
+    )  # fmt: skip
+    arm_clearance: float = setting(
+        0.01, "m", "Distance kept between the arms.",
+        "[A] Own choice.",
+        at_least=0.0, at_most=0.2,
+    )  # fmt: skip
+    obstacle_clearance: float = setting(
+        0.005, "m", "Distance kept between robot and surroundings.",
+        "[A] Own choice.",
+        at_least=0.0, at_most=0.1,
+    )  # fmt: skip
+    max_iterations: int = setting(
+        20000, "", "Iterations of the sampling planner, per path.",
+        "[A] Own choice; iterations and not seconds, so that runs repeat.",
+        at_least=1, at_most=10_000_000,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class InsertionConfig:
+    """Compliant insertion of a shaft or boss into its hole."""
+
+    force_limit: float = setting(
+        10.0, "N", "Largest downward force.",
+        "[M] Above it a sharp edge is squeezed in.",
+        above=0.0, at_most=30.0,
+    )  # fmt: skip
+    lateral_stiffness: float = setting(
+        4000.0, "N/m", "Lateral stiffness of the compliance centred on the hole.",
+        "[M] 3000 to 6000 work.",
+        above=0.0, at_most=1e5,
+    )  # fmt: skip
+    rotational_stiffness: float = setting(
+        5.0, "N m/rad", "Rotational stiffness of the compliance centred on the hole.",
+        "[M] Stiffer leaves the plate tilted on the motor.",
+        above=0.0, at_most=1e3,
+    )  # fmt: skip
+    speed: float = setting(
+        0.012, "m/s", "Speed of the descent.",
+        "[A] Own choice.",
+        above=0.0, at_most=0.1,
+    )  # fmt: skip
+    landing_speed: float = setting(
+        3e-3, "m/s", "Speed of the descent around the seat, which is stiff.",
+        "[M] 20 mm/s strike the seat with 40 N.",
+        above=0.0, at_most=0.1,
+    )  # fmt: skip
+    search_force: float = setting(
+        3.0, "N", "Downward force during the spiral.",
+        "[M] In simulation.",
+        above=0.0, at_most=30.0,
+    )  # fmt: skip
+    search_pitch: float = setting(
+        1.5e-4, "m", "Distance between two turns of the spiral.",
+        "[M] About twice the radial clearance.",
+        above=0.0, at_most=0.01,
+    )  # fmt: skip
+    search_speed: float = setting(
+        5e-3, "m/s", "Speed along the spiral.",
+        "[A] Own choice.",
+        above=0.0, at_most=0.1,
+    )  # fmt: skip
+    search_radius: float = setting(
+        1.5e-3, "m", "Radius at which the search gives up.",
+        "[A] Own choice.",
+        above=0.0, at_most=0.02,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class DisturbanceConfig:
+    """Deviations from the nominal layout, drawn once per run from the seed."""
+
+    tray_position_sigma: float = setting(
+        5e-4, "m", "Standard deviation of the tray's place along x and y.",
+        "[A] Set down by hand.",
+        at_least=0.0, at_most=0.05,
+    )  # fmt: skip
+    tray_yaw_sigma_deg: float = setting(
+        1.0, "deg", "Standard deviation of the tray's rotation about the vertical.",
+        "[A] Set down by hand.",
+        at_least=0.0, at_most=30.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class SensorConfig:
+    """Noise of the sensed poses of parts."""
+
+    position_noise: float = setting(
+        0.0, "m", "Standard deviation of a sensed position, per axis.",
+        "[A] The true pose by default.",
+        at_least=0.0, at_most=0.05,
+    )  # fmt: skip
+    angle_noise_deg: float = setting(
+        0.0, "deg", "Standard deviation of a sensed rotation, about each axis.",
+        "[A] The true pose by default.",
+        at_least=0.0, at_most=30.0,
+    )  # fmt: skip

@@ -1,0 +1,153 @@
+"""Settings of what stands in the cell: how it is stepped, arms, layout, screwdriver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cell.fixtures.jig_dimensions import J_HEIGHT
+from cell.setting import setting
+
+
+@dataclass(frozen=True)
+class SimulationConfig:
+    """How the physics is stepped and logged."""
+
+    time_step: float = setting(
+        1e-3, "s", "Step of the discrete plant.",
+        "[M] At 2 ms parts slip twice as far.",
+        above=0.0, at_most=0.005,
+    )  # fmt: skip
+    contact_approximation: str = setting(
+        "lagged", "", "Drake's discrete contact approximation.",
+        "[M] Thresholds of holding differ between them.",
+        choices=("lagged", "similar", "sap"),
+    )  # fmt: skip
+    log_period: float = setting(
+        0.01, "s", "Time between two samples of the log.",
+        "[A] Own choice.",
+        above=0.0, at_most=10.0,
+    )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class ArmConfig:
+    """One arm: its model, its tool, where it stands, how it waits, its position drive.
+
+    `home_deg`, `stiffness` and `damping` have one number per joint, from base to flange; empty,
+    they are the arm model's own.
+    """
+
+    model: str = setting(
+        "ur5e", "", "Name of the arm model.",
+        "[A] Own choice.",
+    )  # fmt: skip
+    tool: str = setting(
+        "hand_e", "", "Name of the gripper or screwdriver on the flange.",
+        "[A] Own choice: one arm holds, the other drives bolts.",
+    )  # fmt: skip
+    p_WB: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "m", "Origin of the base B in W.",
+        "[A] Own choice: the bases are 0.9 m apart.",
+        at_least=-10.0, at_most=10.0,
+    )  # fmt: skip
+    rpy_deg: tuple[float, float, float] = setting(
+        (0.0, 0.0, 0.0), "deg", "Roll, pitch and yaw of the base in W.",
+        "[A] Own choice.",
+        at_least=-360.0, at_most=360.0,
+    )  # fmt: skip
+    home_pan_deg: float = setting(
+        0.0, "deg", "Angle of the first joint where the arm waits, if home_deg is empty.",
+        "[A] Own choice.",
+        at_least=-360.0, at_most=360.0,
+    )  # fmt: skip
+    home_deg: tuple[float, ...] = setting(
+        (), "deg", "All joint angles to wait in; empty: those of the arm model for the kind of "
+        "tool, with home_pan_deg.",
+        "[A] The models' own: forearm 10 deg up, tool down.",
+        at_least=-360.0, at_most=360.0,
+    )  # fmt: skip
+    stiffness: tuple[float, ...] = setting(
+        (), "N m/rad", "Stiffness of the position drive, per joint; empty: the arm model's own.",
+        "[A] The models' own; stable at any gain.",
+        above=0.0, at_most=1e7,
+    )  # fmt: skip
+    damping: tuple[float, ...] = setting(
+        (), "N m s/rad", "Damping of the position drive, per joint; empty: the arm model's own.",
+        "[D] The models' own: about critical, arm stretched.",
+        above=0.0, at_most=1e6,
+    )  # fmt: skip
+
+    @property
+    def X_WB(self) -> RigidTransform:
+        """Pose of the base."""
+        return RigidTransform(RollPitchYaw(np.deg2rad(self.rpy_deg)), np.array(self.p_WB))
+
+
+@dataclass(frozen=True)
+class WorkcellConfig:
+    """Which fixture there is, and where jig and tray are."""
+
+    fixture: str = setting(
+        "soft_jig", "", "Name of the fixture that parts are placed on.",
+        "[S] The paper's soft jig.",
+    )  # fmt: skip
+    p_WJ: tuple[float, float, float] = setting(
+        (0.0, 0.15, J_HEIGHT), "m", "Jig origin (centre of the base plate's top face) in W; the "
+        "riser is below.",
+        "[A] In the reach of both arms; the riser's model is made for this height.",
+        at_least=-2.0, at_most=2.0,
+    )  # fmt: skip
+    jig_base_fixed: bool = setting(
+        True, "", "Whether the jig's base is bolted down, or free on the force plate.",
+        "[S] Free in the push tests.",
+    )  # fmt: skip
+    p_WT: tuple[float, float, float] = setting(
+        (-0.28, 0.42, 0.03), "m", "Tray origin T in W.",
+        "[A] Own choice.",
+        at_least=-2.0, at_most=2.0,
+    )  # fmt: skip
+    tray_yaw_deg: float = setting(
+        0.0, "deg", "Rotation of the tray about the vertical.",
+        "[A] Own choice.",
+        at_least=-360.0, at_most=360.0,
+    )  # fmt: skip
+
+    @property
+    def X_WJ(self) -> RigidTransform:
+        """Pose of the jig frame while its base is where it was set down."""
+        return RigidTransform(np.array(self.p_WJ))
+
+    @property
+    def X_WT(self) -> RigidTransform:
+        """Nominal pose of the tray."""
+        rpy = RollPitchYaw(0.0, 0.0, np.deg2rad(self.tray_yaw_deg))
+        return RigidTransform(rpy, np.array(self.p_WT))
+
+
+@dataclass(frozen=True)
+class DriverConfig:
+    """The electric screwdriver."""
+
+    free_speed: float = setting(
+        80.0, "rad/s", "Speed of the spindle while the bolt runs down.",
+        "[A] 760 rpm.",
+        above=0.0, at_most=300.0,
+    )  # fmt: skip
+    seat_speed: float = setting(
+        7.0, "rad/s", "Speed of the spindle when the head is near its seat.",
+        "[M] Faster overshoots.",
+        above=0.0, at_most=300.0,
+    )  # fmt: skip
+    push_force: float = setting(
+        10.0, "N", "Thrust on the bit.",
+        "[A] 10, plausible 5-15.",
+        above=0.0, at_most=50.0,
+    )  # fmt: skip
+    counter_hold: bool = setting(
+        True, "", "Whether the gripper holds the clamped part against the torque; else the jig "
+        "alone.",
+        "[M] The jig alone carries about 0.27 N m; then the part turns in its imprint.",
+    )  # fmt: skip
