@@ -14,7 +14,7 @@ import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, arg
 
 from cell.errors import InputError
-from experiments.cli.single import Options, run_up_to
+from experiments.cli.assemble import Assemble
 from planning.operations.registry import operation_named
 
 
@@ -25,7 +25,7 @@ class OperationOptions:
     operation: Annotated[Positional[str], arg(metavar="OPERATION")]
     """Name of the operation to stop after."""
 
-    options: OmitArgPrefixes[Options] = field(default_factory=Options)
+    assemble: OmitArgPrefixes[Assemble] = field(default_factory=Assemble)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -34,7 +34,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         OperationOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
     )
     try:
-        return run_up_to(operation_named(wanted.operation), wanted.operation, wanted.options)
+        return wanted.assemble.run_as(wanted.operation, operation_named(wanted.operation))
     except InputError as error:
         print(f"{wanted.operation}: {error}", file=sys.stderr)
         return 2

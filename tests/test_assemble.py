@@ -21,7 +21,7 @@ from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments import shaft_insertion
 from experiments.assembly import run as run_module
-from experiments.assembly.assemble import run_assemble, run_job
+from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
 from experiments.assembly.prepare import Disturbance, running_cell
 from experiments.assembly.run import Run, go_on
@@ -54,10 +54,10 @@ class MadeUp(Enum):
     REST = "rest"
 
 
-def options(out: Path, **changes: Any) -> dict[str, Any]:
-    """Return the arguments of a quiet assembly run."""
-    given = dict(product=PRODUCT, order=None, config=CONFIG, seed=0, out=out)
-    return given | dict(view=False, replay=None, quiet=True) | changes
+def job(out: Path, **changes: Any) -> Job:
+    """Return a quiet assembly run."""
+    given = dict(product=PRODUCT, order=None, config=CONFIG, seed=0, out=out, quiet=True)
+    return Job(**given | changes)
 
 
 def result_in(out: Path) -> dict[str, Any]:
@@ -79,7 +79,7 @@ def test_order_that_cannot_be_carried_out_is_a_failure(
     capsys: pytest.CaptureFixture,
 ) -> None:
     changes = dict(product=product, order=order, quiet=False)
-    assert run_assemble(**options(tmp_path, **changes)) == 1
+    assert run_job(job(tmp_path, **changes)) == 1
     assert evidence in capsys.readouterr().out
     result = result_in(tmp_path)
     assert result["verdict"] == "failure"
@@ -88,14 +88,14 @@ def test_order_that_cannot_be_carried_out_is_a_failure(
 
 def test_malformed_order_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BadOrder):
-        run_assemble(**options(tmp_path, order=("motor",)))
+        run_job(job(tmp_path, order=("motor",)))
     assert not list(tmp_path.iterdir())
 
 
 def test_product_without_models_is_an_error(tmp_path: Path) -> None:
     bare = {name: replace(part, model=None) for name, part in PRODUCT.parts.items()}
     with pytest.raises(InputError, match="can be planned, but not assembled"):
-        run_assemble(**options(tmp_path, product=replace(PRODUCT, parts=bare)))
+        run_job(job(tmp_path, product=replace(PRODUCT, parts=bare)))
     assert not list(tmp_path.iterdir())
 
 
@@ -103,7 +103,7 @@ def test_part_out_of_reach_is_a_failure_with_evidence(tmp_path: Path) -> None:
     """Not bad input: the run says where it stopped, and leaves the state to look into."""
     far = replace(CONFIG.workcell, p_WT=(-0.28, 1.6, 0.03))
     (tmp_path / "report.html").write_text("of an earlier run")
-    assert run_assemble(**options(tmp_path, config=replace(CONFIG, workcell=far))) == 1
+    assert run_job(job(tmp_path, config=replace(CONFIG, workcell=far))) == 1
     result = result_in(tmp_path)
     assert result["failure"]["phase"] == "place motor: plan the next motion"
     assert "motor" in result["failure"]["evidence"]
@@ -323,7 +323,7 @@ def test_kinetic_energy_does_not_grow_once_a_part_is_placed(placed: Path) -> Non
 
 @pytest.mark.slow
 def test_whole_assembly_succeeds_and_rests(tmp_path: Path) -> None:
-    assert run_assemble(**options(tmp_path)) == 0
+    assert run_job(job(tmp_path)) == 0
     result = result_in(tmp_path)
     kinds = [step["operation"] for step in result["steps"]]
     assert kinds == ["pick_place", "insert_shaft", "place_bolts", "tighten_bolts"]
@@ -339,7 +339,7 @@ def test_whole_assembly_succeeds_and_rests(tmp_path: Path) -> None:
 def test_other_orders_and_products_succeed_by_the_same_code(
     product: str, order: tuple[str, ...] | None, tmp_path: Path
 ) -> None:
-    assert run_assemble(**options(tmp_path, product=load_product(product), order=order)) == 0
+    assert run_job(job(tmp_path, product=load_product(product), order=order)) == 0
     steps = result_in(tmp_path)["steps"]
     assert not [check for step in steps for check in step["failed_checks"]]
     if order is not None:

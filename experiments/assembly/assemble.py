@@ -2,15 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from rich.console import Console
 
-from cell.configuration.config import CellConfig
-from cell.products.product import Product
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
-from experiments.assembly.prepare import check_models, running_cell
+from experiments.assembly.prepare import running_cell
 from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.replay import Replay
 from experiments.assembly.results import write_infeasible, write_results
@@ -21,34 +17,17 @@ from planning.operations.operation import NoOperation, Step
 from planning.operations.sequence import steps
 
 
-def run_assemble(
-    *,
-    product: Product,
-    order: tuple[str, ...] | None,
-    config: CellConfig,
-    seed: int,
-    out: Path,
-    view: bool,
-    replay: Path | None,
-    quiet: bool,
-) -> int:
-    """Plan a product and run its whole assembly; write result, log and report.
-
-    The arguments are those of `Job`.
+def run_job(job: Job) -> int:
+    """Plan, run, measure and report; write result, log and report.
 
     Returns:
         0 if the whole assembly succeeded, else 1.
 
     Raises:
-        InputError: Product or order cannot be used; nothing is written.
+        InputError: Product, order or state cannot be used; nothing is written.
     """
-    return run_job(Job(product, order, config, seed, out, view, replay, quiet))
-
-
-def run_job(job: Job) -> int:
-    """Plan, run, measure and report; return 0 if everything succeeded, else 1."""
     console = Console(quiet=job.quiet, highlight=False)
-    check_models(job.product)
+    job.product.check_simulable()
     fixing = plan(job.product, job.order, config=job.config)
     try:
         todo = _steps(job, fixing)

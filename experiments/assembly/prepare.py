@@ -9,7 +9,6 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell.builder import add_cell
 from cell.configuration.config import CellConfig
-from cell.errors import InputError
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 from experiments.assembly.replay import Replay
@@ -49,17 +48,6 @@ class Disturbance:
             tray_yaw_deg=nominal.tray_yaw_deg + self.yaw_deg,
         )
         return replace(config, workcell=tray)
-
-
-def check_models(product: Product) -> None:
-    """Raise `InputError` for a product that can be planned only, not simulated."""
-    bare = [p.name for p in product.parts.values() if p.model is None or p.X_TrayP is None]
-    if bare:
-        raise InputError(
-            f"Product '{product.name}' can be planned, but not assembled in the twin: "
-            f"{', '.join(bare)} has no simulation model or no place in a tray. "
-            f"A product file gives both; see models/products/motor_unit.yaml."
-        )
 
 
 def running_cell(
