@@ -186,7 +186,7 @@ def add_cell(
     jig_base = JigBase(config, plant, workcell.base, workcell.plate, wiring.sleeper)
 
     def reset(root: Context) -> None:
-        threads.reset(root)
+        threads.install(root)
         jig_base.reset(root)
         fixture.install(root)
 

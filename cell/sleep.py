@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from pydrake.common.value import AbstractValue, Value
@@ -40,7 +41,7 @@ class SleepMemory:
 
     loads: dict[str, Forces] = field(default_factory=dict)
     latest: dict[str, Forces] = field(default_factory=dict)
-    restored_at: float = 0.0
+    restored_at: float = -inf
 
 
 class Sleep(LeafSystem):
@@ -124,7 +125,7 @@ class Sleep(LeafSystem):
     def _load_of(self, root: Context, body: RigidBody) -> Forces:
         """Return the forces that a body exerted on the bearers in the latest step."""
         memory, name = self.memory(root), body.scoped_name().get_full()
-        if root.get_time() <= memory.restored_at:
+        if root.get_time() == memory.restored_at:
             return memory.latest.get(name, [])
         return list(self._contact_forces(root, body))
 

@@ -222,7 +222,7 @@ def test_loosened_bolt_has_its_own_inertia_and_turns_freely() -> None:
     rig = ThreadRig()
     rig.threads.set(rig.root, BOLT, Engagement(ThreadState.CAUGHT, bit_position=2))
     assert mass(rig) > rig.bolt.default_mass()
-    rig.threads.reset(rig.root)
+    rig.threads.set(rig.root, BOLT, Engagement())
     inertia = rig.bolt.CalcSpatialInertiaInBodyFrame(rig.context)
     real = rig.bolt.default_spatial_inertia()
     np.testing.assert_allclose(
