@@ -7,8 +7,18 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+import trimesh
+from pydrake.geometry import (
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Box,
+    ProximityProperties,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import RigidBody, SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
@@ -23,6 +33,22 @@ Snapshot = dict[str, np.ndarray]
 
 QUICK = CellConfig.load(overrides=["jig.vacuum.time_constant=0.05"])  # Jams in 0.15 s.
 STEP = QUICK.simulation.time_step
+CAN_REAR = -0.0534  # Of the motor's can, in the motor's frame [m].
+
+
+BOX = (0.03, 0.03, 0.04)  # Of a caller's own body [m].
+
+
+def add_box(plant: MultibodyPlant, _: SceneGraph) -> None:
+    """Add a caller's own body, which the frozen bed can hold."""
+    instance = plant.AddModelInstance("box")
+    body = plant.AddRigidBody("box", instance, SpatialInertia.SolidBoxWithMass(0.2, *BOX))
+    properties = ProximityProperties()
+    AddRigidHydroelasticProperties(0.01, properties)
+    AddContactMaterial(friction=CoulombFriction(0.5, 0.5), properties=properties)
+    pose = RigidTransform()
+    plant.RegisterCollisionGeometry(body, pose, Box(*BOX), "bed_box", properties)
+    plant.SetDefaultFloatingBaseBodyPose(body, RigidTransform([0.0, 0.15, 0.5]))
 
 
 def small_product(*names: str) -> Product:
@@ -40,36 +66,49 @@ def small_product(*names: str) -> Product:
 # Commands.
 
 
-def put_motor_on_jig(cell: Cell, root: Context, sink: float = 0.002) -> None:
-    """Stand the motor on the fixture, this far in [m], awake."""
-    motor = cell.parts["motor"]
-    cell.parts.wake(root, "motor")
+def stand_on_jig(cell: Cell, root: Context, body: RigidBody, low: float, sink: float) -> None:
+    """Stand a body on the fixture, awake.
+
+    Args:
+        cell, root: The cell and the Context of the diagram.
+        body: Free.
+        low: Its lowest point, in its own frame [m].
+        sink: How far it is let into the fixture [m].
+    """
+    cell.sleeper.wake(root, body)
     context = cell.plant.GetMyMutableContextFromRoot(root)
-    rear = -0.0534  # Of the can, in the motor's frame [m].
-    X_JM = RigidTransform([0.0, 0.0, cell.fixture.entry_height - rear - sink])
-    cell.plant.SetFreeBodyPose(context, motor.body, cell.fixture.pose(context) @ X_JM)
+    X_JP = RigidTransform([0.0, 0.0, cell.fixture.entry_height - low - sink])
+    cell.plant.SetFreeBodyPose(context, body, cell.fixture.pose(context) @ X_JP)
 
 
-def push(cell: Cell, root: Context, force: float) -> None:
-    """Push the motor's end down [N]."""
+def push(cell: Cell, root: Context, body: RigidBody, force: float) -> None:
+    """Push a body down [N], near its low end."""
     F_W = SpatialForce(np.zeros(3), np.array([0.0, 0.0, -force]))
-    load = applied_force(cell.parts["motor"].body.index(), np.array([0.0, 0.0, -0.05]), F_W)
+    low = np.array([0.0, 0.0, -0.05 if body.name() != "box" else -0.02])
     port = cell.ports.inputs["external_forces"]
     context = port.get_system().GetMyMutableContextFromRoot(root)
-    port.FixValue(context, [load] if force else [])
+    port.FixValue(context, [applied_force(body.index(), low, F_W)] if force else [])
 
 
 def press_motor(cell: Cell, root: Context) -> None:
     """Put the motor onto the fixture and push it in."""
-    put_motor_on_jig(cell, root)
     motor = cell.parts["motor"]
+    stand_on_jig(cell, root, motor.body, CAN_REAR, 0.002)
     cell.fixture.receive(root, motor.body, motor.part.mesh)
-    push(cell, root, 20.0)
+    push(cell, root, motor.body, 20.0)
+
+
+def press_box(cell: Cell, root: Context) -> None:
+    """Put a caller's own body onto the fixture and push it in."""
+    box = cell.plant.GetBodyByName("box")
+    stand_on_jig(cell, root, box, -BOX[2] / 2, 0.002)
+    cell.fixture.receive(root, box, trimesh.creation.box(BOX))
+    push(cell, root, box, 20.0)
 
 
 def let_go(cell: Cell, root: Context) -> None:
     """End the push."""
-    push(cell, root, 0.0)
+    push(cell, root, cell.parts["motor"].body, 0.0)
 
 
 def fix(cell: Cell, root: Context) -> None:
@@ -110,8 +149,11 @@ def stiffen_arm(cell: Cell, root: Context) -> None:
 
 
 def catch_bolt(cell: Cell, root: Context) -> None:
-    """Put the first thread into the state of a caught one, the spindle turning."""
+    """Screw a bolt home into the motor, wherever that is, and let the spindle turn."""
+    context, thread = cell.plant.GetMyMutableContextFromRoot(root), cell.threads["bolt_1"]
     cell.parts.wake(root, "bolt_1")
+    X_WF = thread.thread_frame.CalcPoseInWorld(context)
+    cell.plant.SetFreeBodyPose(context, thread.bolt, X_WF)
     cell.driver.tool.command(root, 5.0)
     cell.threads.set(root, "bolt_1", Engagement(ThreadState.CAUGHT))
 
@@ -124,6 +166,11 @@ JIG_STORY: Story = {
     450: sleep,
     500: wake,
     600: free,
+}
+BOX_STORY: Story = JIG_STORY | {
+    0: press_box,
+    450: lambda cell, root: cell.sleeper.put_to_sleep(root, cell.plant.GetBodyByName("box")),
+    500: lambda cell, root: cell.sleeper.wake(root, cell.plant.GetBodyByName("box")),
 }
 JIG_STEPS = 750
 
@@ -141,16 +188,26 @@ def play_ours(cell: Cell, story: Story, steps: int) -> Simulation:
 
 
 class Player:
-    """Plays a story with Drake's own simulator: one line more than any Drake program has."""
+    """Plays a story with Drake's own simulator: one line more than any Drake program has.
 
-    def __init__(self, cell: Cell, story: Story) -> None:
+    Args:
+        cell: In the diagram.
+        story: Its commands.
+        simulator: Of the diagram, with the monitor; None makes one.
+    """
+
+    def __init__(self, cell: Cell, story: Story, simulator: Simulator | None = None) -> None:
         assert cell.diagram is not None
-        self.cell, self.story, self.step = cell, story, 0
-        self.simulator = Simulator(cell.diagram)
-        self.simulator.set_monitor(cell.monitor)
+        self.cell, self.story = cell, story
+        if simulator is None:
+            simulator = Simulator(cell.diagram)
+            simulator.set_monitor(cell.monitor)
+        self.simulator = simulator
         self.simulator.Initialize()
         self.root = self.simulator.get_mutable_context()
-        cell.parts.sleep_all_but(self.root, ())
+        self.step = round(self.root.get_time() / STEP)
+        if self.step == 0:
+            cell.parts.sleep_all_but(self.root, ())
 
     def play(self, steps: int) -> Player:
         """Go on by some steps, in as few strides as the story allows."""
@@ -158,8 +215,7 @@ class Player:
         while self.step < end:
             if self.step in self.story:
                 self.story[self.step](self.cell, self.root)
-            self.step = min([k for k in self.story if k > self.step] + [end], default=end)
-            self.step = min(self.step, end)
+            self.step = min([k for k in self.story if self.step < k < end] + [end])
             self.simulator.AdvanceTo(self.step * STEP)
         return self
 
