@@ -67,14 +67,7 @@ def small_product(*names: str) -> Product:
 
 
 def stand_on_jig(cell: Cell, root: Context, body: RigidBody, low: float, sink: float) -> None:
-    """Stand a body on the fixture, awake.
-
-    Args:
-        cell, root: The cell and the Context of the diagram.
-        body: Free.
-        low: Its lowest point, in its own frame [m].
-        sink: How far it is let into the fixture [m].
-    """
+    """Stand a free body on the fixture, awake: its lowest point ``sink`` [m] below the top."""
     cell.sleeper.wake(root, body)
     context = cell.plant.GetMyMutableContextFromRoot(root)
     X_JP = RigidTransform([0.0, 0.0, cell.fixture.entry_height - low - sink])
