@@ -40,7 +40,8 @@ def test_part_lies_still_in_the_tray_within_the_arms_reach(posture: str) -> None
     """As the posture has it turned: on the tray, not in it, and there is a way to grasp it."""
     robot = hand(posture)
     before = robot.observer.X_WP
-    robot.observer.stage.part.wake(robot.observer.root)
+    cell = robot.simulation.cell
+    cell.parts.wake(robot.observer.root, POSTURES[posture].part)
     for _ in range(150):
         robot.simulation.step()
     after = robot.observer.X_WP
