@@ -138,7 +138,7 @@ def _stage(cell: Cell, part: str) -> Stage:
         fixture=cell.fixture,
         part=cell.parts[part],
         surface=SurfaceSamples.of(part, cell.product.parts[part].mesh).points,
-        gripper=cell.holder.tool,
+        gripper=cell.gripper,
         wrist=cell.holder.wrist,
         force_plate=cell.force_plate,
     )
