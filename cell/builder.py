@@ -13,13 +13,13 @@ from dataclasses import dataclass, replace
 from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, MultibodyPlantConfig
-from pydrake.systems.framework import Context, Diagram, DiagramBuilder, LeafSystem
+from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.configuration.config import CellConfig
 from cell.errors import UnknownName
 from cell.fixtures import add_fixture
 from cell.fixtures.base import Fixture
-from cell.forces import ForceSum
+from cell.fixtures.wiring import wire_fixture
 from cell.machines.arm import Arm
 from cell.machines.devices import add_arms, make_drives
 from cell.machines.drive import JointDrive
@@ -50,6 +50,7 @@ class Cell:
         fixture: Holds a part on the base.
         parts: The loose parts.
         threads: Of the product's bolts.
+        sleeper: Puts parts and base to sleep.
         force_plate: Wrench sensor under the jig.
         ports: Inputs and outputs by name.
         monitor: For `Simulator.set_monitor`.
@@ -168,20 +169,10 @@ def add_cell(
         extend(plant, scene_graph)
     plant.Finalize()
 
-    sleeper = Sleep(plant, scene_graph, (workcell.base, workcell.plate))
+    bearers = (workcell.base, workcell.plate)
+    wiring = wire_fixture(builder, plant, scene_graph, fixture, bearers, prefix)
+    builder.AddNamedSystem(f"{prefix}threads", threads)
     force_plate = WrenchSensor(plant, workcell.plate_weld)
-    forces = ForceSum(("fixture", "sleep", "external"))
-    systems: dict[str, LeafSystem] = {
-        kind: fixture,
-        "threads": threads,
-        "sleep": sleeper,
-        "forces": forces,
-    }
-    for system_name, system in systems.items():
-        builder.AddNamedSystem(f"{prefix}{system_name}", system)
-    builder.Connect(fixture.GetOutputPort("applied_forces"), forces.GetInputPort("fixture"))
-    builder.Connect(sleeper.get_output_port(), forces.GetInputPort("sleep"))
-    builder.Connect(forces.get_output_port(), plant.get_applied_spatial_force_input_port())
     ports = Ports()
     for arm in arms.values():
         ports.add(*arm.connect(builder, prefix))
@@ -191,8 +182,8 @@ def add_cell(
         ports.inputs[f"jig.{port.get_name()}"] = port
     for port in fixture.outputs():
         ports.outputs[f"jig.{port.get_name()}"] = port
-    ports.inputs["external_forces"] = forces.GetInputPort("external")
-    jig_base = JigBase(config, plant, workcell.base, workcell.plate, sleeper)
+    ports.inputs["external_forces"] = wiring.forces.GetInputPort("external")
+    jig_base = JigBase(config, plant, workcell.base, workcell.plate, wiring.sleeper)
 
     def reset(root: Context) -> None:
         threads.reset(root)
@@ -207,9 +198,9 @@ def add_cell(
         arms=arms,
         jig_base=jig_base,
         fixture=fixture,
-        parts=replace(parts, sleeper=sleeper),
+        parts=replace(parts, sleeper=wiring.sleeper),
         threads=threads,
-        sleeper=sleeper,
+        sleeper=wiring.sleeper,
         force_plate=force_plate,
         ports=ports,
         monitor=Monitor(counter, reset, (fixture, threads)),

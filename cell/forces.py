@@ -68,6 +68,10 @@ class ForceSum(LeafSystem):
             "forces", no_forces, self._calc, {self.all_input_ports_ticket()}
         )
 
+    def fix(self, root: Context, name: str, forces: list[ExternallyAppliedSpatialForce]) -> None:
+        """Give an input that nothing is connected to a value, in a Context of the diagram."""
+        self.GetInputPort(name).FixValue(self.GetMyMutableContextFromRoot(root), forces)
+
     def _calc(self, context: Context, output: AbstractValue) -> None:
         ports = (port for port in self._inputs if port.HasValue(context))
         output.set_value([force for port in ports for force in port.Eval(context)])

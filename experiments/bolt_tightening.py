@@ -9,12 +9,13 @@ The first line runs the whole assembly up to there; the second goes on from a se
 import sys
 from collections.abc import Sequence
 
-from experiments.cli.single import run_operation
+from experiments.cli.single import run_script
+from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the script; return the exit code."""
-    return run_operation("bolt_tightening", "tighten_bolts", __doc__, arguments)
+    return run_script(TIGHTEN_BOLTS, "bolt_tightening", __doc__, arguments)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Operation pick_place: the part that the jig holds, from the tray into the bed, and frozen there.
+"""Operation pick_place: the part that the fixture holds, from the tray into it, and fixed there.
 
     python -m experiments.pick_place --out out/pick_place
 
@@ -8,12 +8,13 @@ The planner says which part that is and which side is up.
 import sys
 from collections.abc import Sequence
 
-from experiments.cli.single import run_operation
+from experiments.cli.single import run_script
+from planning.operations.pick_place import PICK_PLACE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the script; return the exit code."""
-    return run_operation("pick_place", "pick_place", __doc__, arguments)
+    return run_script(PICK_PLACE, "pick_place", __doc__, arguments)
 
 
 if __name__ == "__main__":

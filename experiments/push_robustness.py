@@ -93,7 +93,7 @@ class Options:
     """Also halve the time step, refine the bed's mesh, and take other contact approximations."""
 
     controls: bool = False
-    """Also push without suction, at 30 kPa, on the bed left soft, and on a flat rigid block."""
+    """Also push without suction, at 30 kPa, on the bed left soft, and on a flat rigid plate."""
 
     workers: Annotated[int, arg(metavar="CORES")] = 1
     """Variants at a time."""
@@ -108,12 +108,10 @@ class Variant:
     Attributes:
         name: For the table.
         changes: What differs from the configuration.
-        bed: "soft" or "rigid".
     """
 
     name: str
     changes: Changes = field(default_factory=dict)
-    bed: str = "soft"
 
 
 def value_at(config: CellConfig, path: str) -> float:
@@ -148,7 +146,7 @@ def variants(options: Options, config: CellConfig) -> list[Variant]:
         found += [Variant(name, changes) for name, changes in NUMERICS.items()]
     if options.controls:
         found += [Variant(name, changes) for name, changes in CONTROLS.items()]
-        found.append(Variant("rigid block", bed="rigid"))
+        found.append(Variant("flat rigid plate", {"workcell.fixture": "flat_plate"}))
     if options.one_by_one:
         for path in PARAMETERS:
             for change in (options.spread, -options.spread):
@@ -173,7 +171,6 @@ def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
         cases_of("push", options.case),
         product=load_product("motor_unit"),
         config=config_of(options, variant),
-        bed=variant.bed,
         trials=1,
         seed=options.common.seed,
     )

@@ -25,8 +25,12 @@ from cell.errors import CellError
 from cell.products.loading import load_product
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
-from experiments.metrics.criteria import LIMITS, Limit
 from experiments.reporting.output import output_folder, write_json
+from planning.operations.limits import Limit
+from planning.operations.registry import OPERATIONS
+
+Bound = tuple[str, Limit]  # Name of an operation, and one of its limits.
+Range = tuple[float, float]  # Smallest and largest value.
 
 
 @dataclass(frozen=True)
@@ -66,7 +70,8 @@ def _repeat(options: Options) -> int:
         spawn = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
             results = list(pool.map(_run, _jobs(options)))
-        ranges = {limit: _range(limit, results) for limit in LIMITS}
+        bounds = [(name, limit) for name, o in OPERATIONS.items() for limit in o.limits]
+        ranges = {bound: _range(*bound, results) for bound in bounds}
         write_json(out / "summary.json", _summary(results, ranges))
     console.print(_seed_table(results))
     console.print(_range_table(ranges))
@@ -86,13 +91,13 @@ def _run(job: Assemble) -> dict[str, Any]:
     return json.loads((job.common.out / "result.json").read_text(encoding="utf-8"))
 
 
-def _range(limit: Limit, results: Sequence[dict[str, Any]]) -> tuple[float, float] | None:
+def _range(operation: str, limit: Limit, results: Sequence[dict[str, Any]]) -> Range | None:
     """Return the smallest and the largest value of a limited quantity over all runs and parts."""
     values = [
         value
         for result in results
         for step in result["steps"]
-        if step["operation"] == limit.kind
+        if step["operation"] == operation
         for name, value in step["measured"].items()
         if name.rsplit("/", 1)[-1] == limit.quantity
     ]
@@ -107,7 +112,7 @@ def _failures(result: dict[str, Any]) -> list[str]:
 
 
 def _summary(
-    results: Sequence[dict[str, Any]], ranges: dict[Limit, tuple[float, float] | None]
+    results: Sequence[dict[str, Any]], ranges: dict[Bound, Range | None]
 ) -> dict[str, Any]:
     return {
         "runs": [
@@ -119,7 +124,7 @@ def _summary(
             }
             for result in results
         ],
-        "ranges": {f"{limit.kind}/{limit.quantity}": found for limit, found in ranges.items()},
+        "ranges": {f"{name}/{limit.quantity}": found for (name, limit), found in ranges.items()},
     }
 
 
@@ -132,11 +137,11 @@ def _seed_table(results: Sequence[dict[str, Any]]) -> Table:
     return table
 
 
-def _range_table(ranges: dict[Limit, tuple[float, float] | None]) -> Table:
+def _range_table(ranges: dict[Bound, Range | None]) -> Table:
     table = Table("operation", "quantity", "smallest", "largest", "limit", title="Over all runs")
-    for limit, found in ranges.items():
+    for (name, limit), found in ranges.items():
         low, high = ("-", "-") if found is None else (f"{value:.4g}" for value in found)
-        table.add_row(limit.kind, limit.quantity, low, high, f"{limit.limit:.4g}")
+        table.add_row(name, limit.quantity, low, high, f"{limit.limit:.4g}")
     return table
 
 

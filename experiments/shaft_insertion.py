@@ -9,12 +9,13 @@ The first line places the part on the jig before; the second goes on from where 
 import sys
 from collections.abc import Sequence
 
-from experiments.cli.single import run_operation
+from experiments.cli.single import run_script
+from planning.operations.insert_shaft import INSERT_SHAFT
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the script; return the exit code."""
-    return run_operation("shaft_insertion", "insert_shaft", __doc__, arguments)
+    return run_script(INSERT_SHAFT, "shaft_insertion", __doc__, arguments)
 
 
 if __name__ == "__main__":

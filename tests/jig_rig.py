@@ -21,7 +21,6 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
     CoulombFriction,
-    ExternallyAppliedSpatialForce,
     MultibodyPlantConfig,
 )
 from pydrake.multibody.tree import (
@@ -36,7 +35,11 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from trimesh.exchange.obj import export_obj
 
-from cell.fixtures.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
+from cell.fixtures.soft_jig import JigParameters, JigState, SoftJig
+from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.wiring import wire_fixture
+from cell.forces import applied_force
+from cell.monitor import Monitor, StepCounter
 
 # Motor of the product, in its own frame: gearbox front face at z = 0, +z along the shaft [M].
 CAN_RADIUS, CAN_REAR, GEARBOX_RADIUS, GEARBOX_REAR = 0.0174, -0.0534, 0.0184, -0.024
@@ -54,13 +57,13 @@ def can_mesh() -> trimesh.Trimesh:
     return trimesh.convex.convex_hull(np.concatenate(ends))
 
 
-def motor_samples() -> SurfaceSamples:
+def motor_mesh() -> trimesh.Trimesh:
     """Return the stand-in's surface: can and gearbox, no terminals."""
     gearbox = trimesh.creation.cylinder(radius=GEARBOX_RADIUS, height=-GEARBOX_REAR, sections=48)
     gearbox.apply_translation([0, 0, GEARBOX_REAR / 2])
     whole = trimesh.util.concatenate([can_mesh(), gearbox])
     assert isinstance(whole, trimesh.Trimesh)
-    return SurfaceSamples.of("motor", whole)
+    return whole
 
 
 def _rigid() -> ProximityProperties:
@@ -86,6 +89,7 @@ class Rig:
 
     def __post_init__(self) -> None:
         builder = DiagramBuilder()
+        counter = builder.AddNamedSystem("steps", StepCounter(self.time_step))
         config = MultibodyPlantConfig(
             time_step=self.time_step,
             contact_model="hydroelastic_with_fallback",
@@ -96,18 +100,17 @@ class Rig:
         self.plant.WeldFrames(
             self.plant.world_frame(), base.body_frame(), RigidTransform([0, 0.15, 0.2])
         )
-        self.jig = SoftJig.add(self.plant, self.scene_graph, base, self.params)
+        self.jig = SoftJig(self.plant, self.scene_graph, base, self.params)
         self.motor = self._add_motor()
         self._add_carriage()
         self.plant.Finalize()
+        self.forces = wire_fixture(builder, self.plant, self.scene_graph, self.jig, [base]).forces
         self.diagram = builder.Build()
         self.simulator = Simulator(self.diagram)
+        self.simulator.set_monitor(Monitor(counter, self.jig.install, [self.jig]))
         self.context = self.simulator.get_mutable_context()
         self.plant_context = self.plant.GetMyMutableContextFromRoot(self.context)
-        self.jig.press_with(self.motor, motor_samples())
-        self.jig.inflate(self.context)
-        self.jig.soften(self.context)
-        self.extra: list[ExternallyAppliedSpatialForce] = []
+        self.jig.receive(self.context, self.motor, motor_mesh())
         self.start_height = 0.2 + self.params.bag.cap_height - CAN_REAR + 0.5e-3
         self.command(self.start_height)
         X_WM = RigidTransform([0, 0.15, self.start_height])
@@ -158,12 +161,9 @@ class Rig:
         port.FixValue(self.plant_context, [height, speed])
 
     def step(self, count: int = 1) -> None:
-        """Advance the simulation, the jig after each step."""
+        """Advance the simulation."""
         for _ in range(count):
-            port = self.plant.get_applied_spatial_force_input_port()
-            port.FixValue(self.plant_context, self.jig.applied_forces + self.extra)
             self.simulator.AdvanceTo(self.context.get_time() + self.time_step)
-            self.jig.step(self.context, self.time_step)
 
     def press(self, speed: float = 0.02, duration: float = 1.5) -> None:
         """Lower the carriage until its drive is at its limit and the motor has come to rest."""
@@ -174,7 +174,7 @@ class Rig:
     def jam(self) -> None:
         """Evacuate until the bed is frozen."""
         self.jig.evacuate(self.context)
-        while self.jig.state is not JigState.JAMMED:
+        while not self.jig.fixed(self.context):
             self.step()
 
     def let_go(self) -> None:
@@ -211,8 +211,20 @@ class Rig:
         p_MQ: tuple[float, float, float],
     ) -> None:
         """Load the motor at a point of it, in world axes, from the next step on."""
-        load = ExternallyAppliedSpatialForce()
-        load.body_index = self.motor.index()
-        load.p_BoBq_B = np.array(p_MQ)
-        load.F_Bq_W = SpatialForce(np.array(torque), np.array(force))
-        self.extra = [load]
+        F_W = SpatialForce(np.array(torque), np.array(force))
+        load = applied_force(self.motor.index(), np.array(p_MQ), F_W)
+        self.forces.fix(self.context, "external", [load])
+
+    def unload(self) -> None:
+        """End the load."""
+        self.forces.fix(self.context, "external", [])
+
+    @property
+    def bed(self) -> Bed:
+        """The bed of beads, as it is now."""
+        return self.jig.memory(self.context).bed
+
+    @property
+    def state(self) -> JigState:
+        """State of the jig."""
+        return self.jig.memory(self.context).state

@@ -3,6 +3,7 @@
 import json
 from collections.abc import Iterator
 from dataclasses import replace
+from enum import Enum
 from pathlib import Path
 from typing import Any
 
@@ -11,36 +12,52 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cell.configuration.config import CellConfig
-from cell.errors import BadOrder, CellError
+from cell.errors import BadOrder, InputError
+from cell.products.joints import Fit
 from cell.products.loading import load_product
-from cell.products.product import Fit, Product
+from cell.products.product import Product
 from cell.simulation.phase import Outcome, Phase, after
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments import shaft_insertion
 from experiments.assembly import run as run_module
-from experiments.assembly.assemble import run_assemble, run_job
+from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
 from experiments.assembly.prepare import Disturbance, running_cell
 from experiments.assembly.run import Run, go_on
-from experiments.metrics.record import OperationRecord
 from planning.assembly_plan.planner import plan
-from planning.operations import insert_shaft
-from planning.operations.carry_out import phases
 from planning.operations.grasping import let_go
-from planning.operations.insert_shaft import goal_pose
-from planning.operations.sequence import Operation, operations
-from planning.operations.station import Station
+from planning.operations.insert_shaft import INSERT_SHAFT
+from planning.operations.insert_shaft import phases as insert_phases
+from planning.operations.insert_shaft.phases import goal_pose
+from planning.operations.operation import Step
+from planning.operations.pick_place import PICK_PLACE
+from planning.operations.pick_place.phases import PlacePhase
+from planning.operations.record import StepRecord
+from planning.operations.sequence import steps
+from planning.operations.set_aside import SET_ASIDE
+from planning.operations.snapshot import take_snapshot
+from planning.operations.station import Placement, Station
+from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 
 PRODUCT = load_product("motor_unit")
 CONFIG = CellConfig()
-PLACE = Operation("place motor", "pick_place", ("motor",))
+LOOSE = replace(PRODUCT, joints=tuple(PRODUCT.screws.values()))  # Without its fit.
+PLACE = Step("place motor", PICK_PLACE, ("motor",))
 
 
-def options(out: Path, **changes: Any) -> dict[str, Any]:
-    """Return the arguments of a quiet assembly run."""
-    given = dict(product=PRODUCT, order=None, config=CONFIG, seed=0, out=out)
-    return given | dict(view=False, replay=None, quiet=True) | changes
+class MadeUp(Enum):
+    """Phases made up for a test."""
+
+    LOOK = "look"
+    WAIT = "wait"
+    REST = "rest"
+
+
+def job(out: Path, **changes: Any) -> Job:
+    """Return a quiet assembly run."""
+    given = dict(product=PRODUCT, order=None, config=CONFIG, seed=0, out=out, quiet=True)
+    return Job(**given | changes)
 
 
 def result_in(out: Path) -> dict[str, Any]:
@@ -51,7 +68,7 @@ def result_in(out: Path) -> dict[str, Any]:
     ("product", "order", "evidence"),
     [
         (PRODUCT, ("motor", "bolts", "plate"), "blocked in all six directions"),
-        (replace(PRODUCT, fits=()), ("motor", "plate", "bolts"), "nor the hole of a fit"),
+        (LOOSE, ("motor", "plate", "bolts"), "no joint between them"),
     ],
 )
 def test_order_that_cannot_be_carried_out_is_a_failure(
@@ -62,7 +79,7 @@ def test_order_that_cannot_be_carried_out_is_a_failure(
     capsys: pytest.CaptureFixture,
 ) -> None:
     changes = dict(product=product, order=order, quiet=False)
-    assert run_assemble(**options(tmp_path, **changes)) == 1
+    assert run_job(job(tmp_path, **changes)) == 1
     assert evidence in capsys.readouterr().out
     result = result_in(tmp_path)
     assert result["verdict"] == "failure"
@@ -71,14 +88,14 @@ def test_order_that_cannot_be_carried_out_is_a_failure(
 
 def test_malformed_order_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(BadOrder):
-        run_assemble(**options(tmp_path, order=("motor",)))
+        run_job(job(tmp_path, order=("motor",)))
     assert not list(tmp_path.iterdir())
 
 
 def test_product_without_models_is_an_error(tmp_path: Path) -> None:
     bare = {name: replace(part, model=None) for name, part in PRODUCT.parts.items()}
-    with pytest.raises(CellError, match="can be planned, but not assembled"):
-        run_assemble(**options(tmp_path, product=replace(PRODUCT, parts=bare)))
+    with pytest.raises(InputError, match="can be planned, but not assembled"):
+        run_job(job(tmp_path, product=replace(PRODUCT, parts=bare)))
     assert not list(tmp_path.iterdir())
 
 
@@ -86,7 +103,7 @@ def test_part_out_of_reach_is_a_failure_with_evidence(tmp_path: Path) -> None:
     """Not bad input: the run says where it stopped, and leaves the state to look into."""
     far = replace(CONFIG.workcell, p_WT=(-0.28, 1.6, 0.03))
     (tmp_path / "report.html").write_text("of an earlier run")
-    assert run_assemble(**options(tmp_path, config=replace(CONFIG, workcell=far))) == 1
+    assert run_job(job(tmp_path, config=replace(CONFIG, workcell=far))) == 1
     result = result_in(tmp_path)
     assert result["failure"]["phase"] == "place motor: plan the next motion"
     assert "motor" in result["failure"]["evidence"]
@@ -120,20 +137,21 @@ def test_planner_does_not_know_the_disturbance(run: Run) -> None:
     X_WT = Disturbance.draw(CONFIG, 0).applied_to(CONFIG).workcell.X_WT
     part = PRODUCT.parts["motor"]
     assert part.X_TrayP is not None
-    truth = run.simulation.sense("motor")
-    assert truth.IsNearlyEqualTo(X_WT @ part.X_TrayP, 1e-9)
+    run.station.look()
+    assert run.station.pose_of("motor").IsNearlyEqualTo(X_WT @ part.X_TrayP, 1e-9)
     assert run.station.config == CONFIG
+    assert run.disturbance == Disturbance.draw(CONFIG, 0)
 
 
-def test_phase_that_fails_stops_the_run(run: Run, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_phase_that_fails_stops_the_run(run: Run) -> None:
     """The saved state is the one at the start of the phase that failed."""
 
-    def two_phases(station: object, operation: Operation) -> Iterator[Phase]:
-        yield Phase("motor: look", after(0.005), 1.0)
-        yield Phase("motor: wait", lambda sensed: False, timeout=0.01)
+    def two_phases(station: Station, step: Step) -> Iterator[Phase]:
+        yield Phase(MadeUp.LOOK, after(0.005), 1.0, subject="motor")
+        yield Phase(MadeUp.WAIT, lambda sensed: False, timeout=0.01, subject="motor")
 
-    monkeypatch.setattr(run_module, "phases", two_phases)
-    run.run([PLACE, PLACE])
+    failing = replace(PLACE, operation=replace(PICK_PLACE, carry_out=two_phases))
+    run.run([failing, failing])
     assert run.failure is not None
     assert (run.verdict, len(run.steps)) == ("failure", 1)
     assert (run.failure.phase, run.failure.evidence) == (
@@ -143,35 +161,41 @@ def test_phase_that_fails_stops_the_run(run: Run, monkeypatch: pytest.MonkeyPatc
 
 
 def test_saved_state_of_another_order_is_refused(run: Run) -> None:
-    todo = operations(PRODUCT, plan(PRODUCT))
-    with pytest.raises(CellError, match="after insert plate; the plan begins with place motor"):
+    todo = steps(PRODUCT, plan(PRODUCT))
+    with pytest.raises(InputError, match="after insert plate; the plan begins with place motor"):
         go_on(run, todo, {"operations_done": np.array(["insert plate"])})
 
 
-def test_run_that_goes_on_knows_what_is_fixed_and_where_it_was_taken_from(run: Run) -> None:
+def test_run_that_goes_on_remembers_what_the_planner_knew(run: Run) -> None:
     """After the plate was set aside and the motor placed, in another process."""
-    todo = operations(PRODUCT, plan(PRODUCT, ("plate", "bolts", "motor")))
-    origin = run.station.sense("plate")
-    run.done = tuple(operation.name for operation in todo[:4])
-    run.station.origins["plate"] = origin
+    todo = steps(PRODUCT, plan(PRODUCT, ("plate", "bolts", "motor")))
+    station = run.station
+    station.look()
+    run.done = tuple(step.name for step in todo[:4])
+    station.fixed, station.driven = ("motor",), ("bolt_1",)
+    station.origins["plate"] = origin = station.pose_of("plate")
+    station.placements["motor"] = Placement(0.3, origin, np.arange(6.0))
     again = Run(*running_cell(PRODUCT, CONFIG, seed=0))
     left = go_on(again, todo, run_module.final_state(run))
-    assert [operation.kind for operation in left] == ["insert_shaft", "tighten_bolts"]
-    assert again.station.fixed == ("motor",)
+    assert [step.operation.name for step in left] == ["insert_shaft", "tighten_bolts"]
+    assert (again.station.fixed, again.station.driven) == (("motor",), ("bolt_1",))
+    assert again.station.held is None
     assert again.station.origins["plate"].IsExactlyEqualTo(origin)
+    assert again.station.placements["motor"].yaw == 0.3
+    assert again.station.pose_of("bolt_6").IsExactlyEqualTo(station.pose_of("bolt_6"))
 
 
 def test_motion_on_the_jig_counts_from_the_latest_placement(run: Run) -> None:
     """What was on the jig before has been taken off; a run may also begin with a part on it."""
-    now = run_module.take_snapshot(run.simulation)
+    now = take_snapshot(run.simulation)
     ends = [replace(now, time=float(k)) for k in range(4)]
-    kinds = ("pick_place", "set_aside", "pick_place", "insert_shaft")
+    operations = (PICK_PLACE, SET_ASIDE, PICK_PLACE, INSERT_SHAFT)
     run.records = [
-        OperationRecord(Operation(kind, kind, ("plate",)), now, end=end)
-        for kind, end in zip(kinds, ends, strict=True)
+        StepRecord(Step(operation.name, operation, ("plate",)), now, end=end)
+        for operation, end in zip(operations, ends, strict=True)
     ]
     run.station.fixed = ("motor",)
-    tighten = Operation("tighten bolts", "tighten_bolts", ("bolt_1",))
+    tighten = Step("tighten bolts", TIGHTEN_BOLTS, ("bolt_1",))
     assert run._record(tighten).placed is ends[2]
     run.records = run.records[3:]
     assert run._record(tighten).placed is now
@@ -181,7 +205,8 @@ def test_motion_on_the_jig_counts_from_the_latest_placement(run: Run) -> None:
 def test_riders_are_planned_and_weighed_with_what_carries_them(run: Run) -> None:
     """On the hand, not in the way of it; nothing is left in it when it has let go."""
     station, riders = run.station, ("bolt_1", "bolt_2")
-    station.held, station.riders = "plate", riders
+    station.look()
+    station.carry("plate", riders)
     around = station.surroundings()
     assert set(around.X_HandP) == {"plate", *riders}
     assert not set(around.X_HandP) & set(around.X_WP)
@@ -199,7 +224,7 @@ def test_riders_are_planned_and_weighed_with_what_carries_them(run: Run) -> None
 
 def some_phases(run: Run, count: int) -> Iterator[Phase]:
     """Yield the first phases of placing the motor."""
-    pending = phases(run.station, PLACE)
+    pending = PLACE.phases(run.station)
     outcome: Outcome | None = None
     for _ in range(count):
         outcome = yield next(pending) if outcome is None else pending.send(outcome)  # type: ignore
@@ -222,7 +247,7 @@ def test_same_seed_is_bit_identical(run: Run) -> None:
 def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a run that has placed the motor."""
     out = tmp_path_factory.mktemp("placed")
-    job = Job(PRODUCT, None, CONFIG, 0, out, quiet=True, command="pick_place", last="pick_place")
+    job = Job(PRODUCT, None, CONFIG, 0, out, quiet=True, command="pick_place", last=PICK_PLACE)
     assert run_job(job) == 0
     return out
 
@@ -244,7 +269,7 @@ def test_placement_leaves_log_and_report(placed: Path) -> None:
         rows = len(log["time"])
         assert all(len(log[name]) == rows for name in log.files if not name.startswith("phase_"))
         assert not [name for name in log.files if "cpu" in name or "wall" in name]
-        assert "motor: press" in log["phase_name"]
+        assert f"motor: {PlacePhase.PRESS.value}" in log["phase_name"]
     page = (placed / "report.html").read_text()
     assert "place motor" in page
     assert "position_error_m" in page or "position error m" in page
@@ -252,7 +277,8 @@ def test_placement_leaves_log_and_report(placed: Path) -> None:
 
 def test_interrupted_run_continues_bit_identically(placed: Path) -> None:
     """With the motor awake on the frozen bed, and a save in the middle."""
-    hold = Phase("motor: rest", after(0.05), 1.0, awake=frozenset(["motor"]), fine_log=True)
+    awake = frozenset(["motor"])
+    hold = Phase(MadeUp.REST, after(0.05), 1.0, subject="motor", awake=awake, fine_log=True)
 
     def rest(simulation: Simulation) -> State:
         simulation.run_phase(hold)
@@ -276,10 +302,10 @@ def energies_at_rest(state: Path) -> list[float]:
     restore_state(simulation, read_state(state))
     parts = list(simulation.cell.parts)
     awake = frozenset(part.part.name for part in parts)
-    simulation.run_phase(Phase("come to rest", after(0.5), 1.0, awake=awake))
+    simulation.run_phase(Phase(MadeUp.WAIT, after(0.5), 1.0, awake=awake))
     energies = []
     for _ in range(10):
-        simulation.run_phase(Phase("rest", after(0.5), 1.0, awake=awake))
+        simulation.run_phase(Phase(MadeUp.REST, after(0.5), 1.0, awake=awake))
         energies.append(sum(part.kinetic_energy(simulation.context) for part in parts))
     return energies
 
@@ -297,7 +323,7 @@ def test_kinetic_energy_does_not_grow_once_a_part_is_placed(placed: Path) -> Non
 
 @pytest.mark.slow
 def test_whole_assembly_succeeds_and_rests(tmp_path: Path) -> None:
-    assert run_assemble(**options(tmp_path)) == 0
+    assert run_job(job(tmp_path)) == 0
     result = result_in(tmp_path)
     kinds = [step["operation"] for step in result["steps"]]
     assert kinds == ["pick_place", "insert_shaft", "place_bolts", "tighten_bolts"]
@@ -313,7 +339,7 @@ def test_whole_assembly_succeeds_and_rests(tmp_path: Path) -> None:
 def test_other_orders_and_products_succeed_by_the_same_code(
     product: str, order: tuple[str, ...] | None, tmp_path: Path
 ) -> None:
-    assert run_assemble(**options(tmp_path, product=load_product(product), order=order)) == 0
+    assert run_job(job(tmp_path, product=load_product(product), order=order)) == 0
     steps = result_in(tmp_path)["steps"]
     assert not [check for step in steps for check in step["failed_checks"]]
     if order is not None:
@@ -329,7 +355,7 @@ def test_search_finds_a_shaft_that_is_not_where_the_sensor_says(
     def misplaced(station: Station, fit: Fit) -> RigidTransform:
         return RigidTransform([3e-3, 0.0, 0.0]) @ goal_pose(station, fit)
 
-    monkeypatch.setattr(insert_shaft, "goal_pose", misplaced)
+    monkeypatch.setattr(insert_phases, "goal_pose", misplaced)
     arguments = ["--start", str(placed / "state.npz"), "--quiet", "--out", str(tmp_path)]
     assert shaft_insertion.main(arguments) == 0
     measured = result_in(tmp_path)["steps"][0]["measured"]

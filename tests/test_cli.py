@@ -27,11 +27,11 @@ def calls(monkeypatch: pytest.MonkeyPatch) -> list[dict]:
         (out / "plan.json").write_text("{}")
         return 1 if product == "stuck" else 0
 
-    def run_assemble(**options):
-        calls.append(options)
+    def run_job(job):
+        calls.append(vars(job))
         return 0
 
-    for name, function in (("plan.command", run_plan), ("assembly.assemble", run_assemble)):
+    for name, function in (("plan.command", run_plan), ("assembly.assemble", run_job)):
         module = ModuleType(f"experiments.{name}")
         setattr(module, function.__name__, function)
         monkeypatch.setitem(sys.modules, module.__name__, module)

@@ -6,24 +6,21 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from experiments.reporting.plots import (
-    DPI,
-    SIZE,
-    plot_force_plate,
-    plot_insertion_force,
-    plot_torque,
-)
+from experiments.reporting.plots import DPI, SIZE, draw, plot_force_plate
+from planning.operations.plot import Plot
 
 N = 50
 RAMP = np.linspace(0.0, 1.0, N)
 FORCE = np.stack([RAMP, 0.5 * RAMP, -10.0 * RAMP], axis=1)
+
+
+def curves(scale: float) -> Plot:
+    lines = {"bolt_1": (RAMP, scale * RAMP**4), "bolt_2": (RAMP, 0.5 * RAMP**4)}
+    return Plot("torque", "angle [turns]", "torque [N m]", lines, ("target", 0.5))
+
+
 PLOTS = {
-    "insertion": lambda scale: plot_insertion_force(6e-3 * RAMP, scale * FORCE, limit=10.0),
-    "torque": lambda scale: plot_torque(
-        {"bolt_1": 30.0 * RAMP, "bolt_2": 25.0 * RAMP},
-        {"bolt_1": scale * RAMP**4, "bolt_2": 0.5 * RAMP**4},
-        target=0.5,
-    ),
+    "curves": lambda scale: draw(curves(scale)),
     "plate": lambda scale: plot_force_plate(
         20.0 * RAMP, scale * FORCE, phases=[("press", 0.0), ("release", 5.0)]
     ),
@@ -46,13 +43,8 @@ def test_plot_is_reproducible_and_follows_the_data(name: str) -> None:
     assert PLOTS[name](1.0) != PLOTS[name](0.3)
 
 
-def test_sign_of_the_axial_force_does_not_matter() -> None:
-    """The plots show how hard, whichever side is measured."""
-    assert plot_insertion_force(RAMP, FORCE) == plot_insertion_force(RAMP, -FORCE)
-
-
 def test_empty_run_still_gives_a_picture() -> None:
     """An assembly that failed before its first bolt has a report all the same."""
     nothing = np.zeros(0)
-    assert pixels(plot_torque({}, {})).size
+    assert pixels(draw(Plot("", "x", "y", {}))).size
     assert pixels(plot_force_plate(nothing, np.zeros((0, 3)))).size

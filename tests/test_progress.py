@@ -6,7 +6,7 @@ from rich.console import Console
 
 from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.run import StepResult
-from experiments.metrics.criteria import FailedCheck
+from planning.operations.limits import FailedCheck
 
 GOOD = StepResult("place motor", "pick_place", "success", 11.9, 30.0, {}, ())
 CHECKS = (

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from experiments import repeat
-from experiments.metrics.criteria import Limit
+from planning.operations.limits import Limit
 
 
 def test_every_seed_is_run_and_its_failure_reported(tmp_path: Path) -> None:
@@ -41,5 +41,5 @@ def test_range_is_over_runs_and_parts() -> None:
     step = {"operation": "tighten_bolts", "measured": {"b1/x": 1.0, "b2/x": -2.0, "b1/y": 9.0}}
     other = {"operation": "place_bolts", "measured": {"b1/x": 50.0}}
     results = [{"steps": [step, other]}, {"steps": [{**step, "measured": {"b1/x": 3.0}}]}]
-    assert repeat._range(Limit("tighten_bolts", "x", 1.0, "", "parts"), results) == (-2.0, 3.0)
-    assert repeat._range(Limit("pick_place", "x", 1.0, ""), results) is None
+    assert repeat._range("tighten_bolts", Limit("x", 1.0, "", "parts"), results) == (-2.0, 3.0)
+    assert repeat._range("pick_place", Limit("x", 1.0, ""), results) is None

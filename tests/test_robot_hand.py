@@ -20,7 +20,7 @@ from planning.motion.kinematics import tool_pose
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import reachable_grasps
 from planning.operations.placement import YAWS, pose_on_jig
-from planning.operations.push import PushLine, can_push, push
+from planning.operations.push.phases import PushLine, can_push, push
 from planning.operations.stroke import Stroke
 
 STILL = Disturbance(RigidTransform(), np.zeros(2), seed=0)
@@ -49,6 +49,7 @@ def test_part_lies_still_in_the_tray_within_the_arms_reach(posture: str) -> None
     assert before.IsNearlyEqualTo(after, 0.03)
     assert robot.observer.speed < 2e-3
     station, grasp = robot.station, POSTURES[posture].grasp
+    station.look()
     name = POSTURES[posture].part
     assert any(True for _ in reachable_grasps(station, name, after, [grasp]))
 
@@ -74,17 +75,19 @@ def test_a_push_out_of_reach_is_refused_with_a_reason() -> None:
 
 def test_hand_follows_the_line_at_the_speed_of_the_stroke_and_stops_dead() -> None:
     robot = hand("motor/P2", "motor/P2/a")
-    seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.left
+    seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.holder
     X_WP = pose_on_jig(robot.station, "motor", "+z", 0.0, 0.04)
     line = push_line(seen.stage, PUSHES["motor/P2/a"], seen.X_WJ, X_WP)
     frame = arm.frame("tip")
-    q = robot.station.configuration("left", frame, line.X_WT, arm.home, [("left_tool", "jig_base")])
+    near = [("left_tool", "jig_base")]
+    q = robot.station.configuration(arm, frame, line.X_WT, arm.home, near)
     seen.stage.plant.SetPositions(seen.context, arm.instance, q)
     (phase,) = push(robot.station, "motor", line)
-    assert isinstance(phase.left, JointMotion)
-    assert phase.left.duration == pytest.approx(line.stroke.duration)
+    motion = phase.commands[arm.name]
+    assert isinstance(motion, JointMotion)
+    assert motion.duration == pytest.approx(line.stroke.duration)
     for t in (0.05, 0.2, line.stroke.duration):
-        q, v = phase.left.at(t)
+        q, v = motion.at(t)
         distance, speed = line.stroke.at(t)
         X_WT = tool_pose(arm, seen.context, frame, q)
         assert X_WT.IsNearlyEqualTo(line.at(distance), 1e-5)
@@ -96,14 +99,14 @@ def test_hand_follows_the_line_at_the_speed_of_the_stroke_and_stops_dead() -> No
 def test_carriage_of_the_rig_is_as_stiff_as_the_arm() -> None:
     """What makes the two hands agree: how far each gives way under a force at the jig."""
     robot, chosen = hand("motor/P2", "motor/P2/a"), PUSHES["motor/P2/a"]
-    seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.left
+    seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.holder
     X_WP = pose_on_jig(robot.station, "motor", "+z", np.pi, 0.04)
     line = push_line(seen.stage, chosen, seen.X_WJ, X_WP)
     near = [("left_tool", "jig_base")]
-    q = robot.station.configuration("left", arm.frame("tip"), line.X_WT, arm.home, near)
+    q = robot.station.configuration(arm, arm.frame("tip"), line.X_WT, arm.home, near)
     seen.stage.plant.SetPositions(seen.context, arm.instance, q)
     jacobian = arm.jacobian(seen.context, arm.frame("tip"), np.zeros(3))
-    compliance = np.diag(jacobian / np.array(arm.config.stiffness) @ jacobian.T)
+    compliance = np.diag(jacobian / np.array(arm.model.stiffness) @ jacobian.T)
     assert 1 / compliance[:3] == pytest.approx(TURN_DRIVE[0], rel=0.35)
     assert 1 / compliance[3:] == pytest.approx(SLIDE_DRIVE[0], rel=0.2)
 
@@ -115,7 +118,8 @@ def test_disturbances_are_those_of_the_rig() -> None:
     robot = bench("motor/P2").begin(draw)
     p_WJ = robot.observer.X_WJ.translation() - np.array(config.workcell.p_WJ)
     assert p_WJ == pytest.approx([*draw.jig_offset, 0.0], abs=1e-9)
-    believed = robot.station.sense("motor")
+    robot.station.look()
+    believed = robot.station.pose_of("motor")
     assert (believed @ draw.X_PDrawn).IsNearlyEqualTo(robot.observer.X_WP, 1e-9)
 
 

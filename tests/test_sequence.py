@@ -1,4 +1,4 @@
-"""From plans to operations: one code for every order and product."""
+"""From plans to steps: one code for every order and product."""
 
 from __future__ import annotations
 
@@ -9,14 +9,16 @@ import pytest
 from cell.products.loading import load_product
 from cell.products.product import Product
 from planning.assembly_plan.planner import plan
-from planning.operations.sequence import NoOperation, Operation, fixed_after, operations
+from planning.operations.insert_shaft import INSERT_SHAFT
+from planning.operations.operation import NoOperation, Step
+from planning.operations.sequence import steps
 
 MOTOR_UNIT, IDLER = load_product("motor_unit"), load_product("idler")
 SIX = tuple(f"bolt_{k}" for k in range(1, 7))
 
 
 def kinds_and_names(product: Product, *order: str) -> list[tuple[str, str]]:
-    return [(o.kind, o.name) for o in operations(product, plan(product, order))]
+    return [(s.operation.name, s.name) for s in steps(product, plan(product, order))]
 
 
 def test_one_part_stays_on_the_jig() -> None:
@@ -38,8 +40,8 @@ def test_one_part_stays_on_the_jig() -> None:
 def test_another_part_is_fixed_and_the_first_comes_back_with_its_bolts(
     product: Product, upper: str, lower: str, bolts: tuple[str, ...]
 ) -> None:
-    todo = operations(product, plan(product, (upper, "bolts", lower)))
-    assert [(o.kind, o.parts, o.riders) for o in todo] == [
+    todo = steps(product, plan(product, (upper, "bolts", lower)))
+    assert [(step.operation.name, step.parts, step.riders) for step in todo] == [
         ("pick_place", (upper,), ()),
         ("place_loose_bolts", bolts, ()),
         ("set_aside", (upper,), bolts),
@@ -60,25 +62,32 @@ def test_bolts_before_what_they_clamp_cannot_be_placed() -> None:
     todo = plan(MOTOR_UNIT, ("motor", "plate", "bolts"))
     step = replace(todo.steps[1], target=("motor",))
     with pytest.raises(NoOperation, match="what it clamps, 'plate', is not there yet"):
-        operations(MOTOR_UNIT, replace(todo, steps=(replace(step, fixed_part="motor"),)))
+        steps(MOTOR_UNIT, replace(todo, steps=(replace(step, fixed_part="motor"),)))
 
 
 def test_group_cannot_be_fixed_on_the_jig() -> None:
     todo = plan(MOTOR_UNIT, ("motor", "plate", "bolts"))
     with pytest.raises(NoOperation, match="'bolts'"):
-        operations(MOTOR_UNIT, replace(todo, steps=(replace(todo.steps[0], fixed_part="bolts"),)))
+        steps(MOTOR_UNIT, replace(todo, steps=(replace(todo.steps[0], fixed_part="bolts"),)))
 
 
 def test_what_is_fixed_follows_from_the_operations() -> None:
     """Loose bolts do not count: they sleep while nothing touches them."""
     fixed: tuple[str, ...] = ()
     seen = []
-    for operation in operations(MOTOR_UNIT, plan(MOTOR_UNIT, ("plate", "bolts", "motor"))):
-        fixed = fixed_after(MOTOR_UNIT, fixed, operation)
+    for step in steps(MOTOR_UNIT, plan(MOTOR_UNIT, ("plate", "bolts", "motor"))):
+        fixed = step.fixed_after(MOTOR_UNIT, fixed)
         seen.append(fixed)
     assert seen == [("plate",), ("plate",), (), ("motor",), ("motor", "plate"), ("motor", "plate")]
 
 
 def test_part_that_rides_along_is_fixed_with_the_one_it_rides_on() -> None:
-    back = Operation("insert a", "insert_shaft", ("plate",), None, ("cover", "bolt_1"))
-    assert fixed_after(MOTOR_UNIT, ("motor",), back) == ("motor", "plate", "cover")
+    back = Step("insert a", INSERT_SHAFT, ("plate",), None, ("cover", "bolt_1"))
+    assert back.fixed_after(MOTOR_UNIT, ("motor",)) == ("motor", "plate", "cover")
+
+
+def test_part_without_a_joint_to_what_stands_there_is_not_brought() -> None:
+    """The message says which joints there are operations for."""
+    bare = replace(MOTOR_UNIT, joints=tuple(MOTOR_UNIT.screws.values()))
+    with pytest.raises(NoOperation, match=r"brings 'plate' to motor.*fit by insert_shaft"):
+        steps(bare, plan(bare, ("motor", "plate", "bolts")))

@@ -6,9 +6,10 @@ from types import ModuleType
 
 import pytest
 
-from experiments import bolt_tightening, pick_place, shaft_insertion
+from experiments import bolt_tightening, operation, pick_place, shaft_insertion
 from experiments.assembly.job import Job
 from experiments.cli import single
+from planning.operations.registry import OPERATIONS
 
 SCRIPTS = {
     "pick_place": (pick_place, "pick_place"),
@@ -27,9 +28,27 @@ def test_script_runs_up_to_its_operation(
     options = ["--seed", "4", "--start", "x.npz", "--quiet", "--out", str(tmp_path / "out")]
     assert script.main([*options, "--set", "placement.press_force=15"]) == 0
     (job,) = jobs
-    assert (job.command, job.last, job.seed, job.start) == (name, last, 4, Path("x.npz"))
+    assert (job.command, job.seed, job.start) == (name, 4, Path("x.npz"))
+    assert job.last is OPERATIONS[last]
     assert job.config.placement.press_force == 15.0
     assert job.product.name == "motor_unit"
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_every_operation_has_a_script(
+    name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    jobs: list[Job] = []
+    monkeypatch.setattr(single, "run_job", lambda job: jobs.append(job) or 0)
+    assert operation.main([name, "idler", "--quiet", "--out", str(tmp_path / "out")]) == 0
+    (job,) = jobs
+    assert (job.command, job.last, job.product.name) == (name, OPERATIONS[name], "idler")
+
+
+def test_unknown_operation_is_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    assert operation.main(["insert_shift", "--out", str(tmp_path / "out")]) == 2
+    assert "Did you mean 'insert_shaft'?" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize("script", [script for script, _ in SCRIPTS.values()])
@@ -47,5 +66,5 @@ def test_start_that_cannot_be_read_is_bad_input(
     if content is not None:
         start.write_text(content)
     assert pick_place.main(["--start", str(start), "--out", str(tmp_path / "out")]) == 2
-    assert f"Cannot read the saved state '{start}'" in capsys.readouterr().err
+    assert str(start) in capsys.readouterr().err
     assert not (tmp_path / "out").exists()

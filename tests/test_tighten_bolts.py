@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 from pydrake.math import RigidTransform
 
+from cell.machines.driver import DriverReading
 from cell.simulation.phase import Sensed
 from planning.operations.station import Station
-from planning.operations.tighten_bolts import CLUTCH_TIME, Clutch, star_order
+from planning.operations.tighten_bolts.phases import CLUTCH_TIME, Clutch, star_order
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
@@ -49,9 +50,10 @@ def test_order_follows_the_bolts_as_they_are_listed() -> None:
 
 def trip_time(torques: list[float], dt: float) -> float | None:
     """Return when a clutch set to 0.5 N m trips, with one torque per step; None: never."""
-    clutch = Clutch(0.5)
+    clutch = Clutch("spindle", 0.5)
     for step, torque in enumerate(torques, start=1):
-        if clutch(cast(Sensed, SimpleNamespace(time=step * dt, spindle_torque=torque))):
+        drivers = {"spindle": DriverReading(push=0.0, torque=torque, speed=0.0)}
+        if clutch(cast(Sensed, SimpleNamespace(time=step * dt, drivers=drivers))):
             return step * dt
     return None
 

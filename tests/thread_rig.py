@@ -12,11 +12,13 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
 from cell import CellConfig, load_product
-from cell.machines.arm import Drive
-from cell.machines.tools import connect_driver, set_driver_gains
+from cell.machines.drive import JointDrive
+from cell.machines.driver import Driver, DriverDrive
+from cell.monitor import Monitor, StepCounter
 from cell.paths import model_url, new_parser
 from cell.products.product import Product
-from cell.workpieces.thread import BIT_SEAT, add_thread
+from cell.workpieces.thread import BIT_SEAT, add_thread, set_head_friction
+from cell.workpieces.threads import Threads
 
 BOLT = "bolt_1"
 BIT_TIP = 0.28  # Of the bit's end from the tool's mount [m].
@@ -27,7 +29,7 @@ FEED_GAIN, FEED_LIMIT = 0.02, 0.02  # Of the carriage that keeps the thrust [m/s
 class ThreadRig:
     """The diagram, its simulator and the handles a test needs.
 
-    The motor is welded to the world with A = W; the bolt stands ``thread_depth`` proud of its seat.
+    The motor is welded to the world with A = W; the bolt stands ``thread_depth`` above its seat.
     """
 
     time_step: float = 1e-3
@@ -35,20 +37,23 @@ class ThreadRig:
 
     def __post_init__(self) -> None:
         builder = DiagramBuilder()
+        counter = builder.AddNamedSystem("steps", StepCounter(self.time_step))
+        self.feed = builder.AddNamedSystem("feed", JointDrive(np.zeros(3)))
+        drive = builder.AddNamedSystem("driver", DriverDrive())
         config = MultibodyPlantConfig(
             time_step=self.time_step,
             contact_model="hydroelastic_with_fallback",
             discrete_contact_approximation="lagged",
         )
         self.config = CellConfig().driver
-        self.fastener = self.product.fasteners[BOLT]
+        self.screw = self.product.screws[BOLT]
         self.plant, scene_graph = AddMultibodyPlant(config, builder)
         self.motor, self.plate, self.bolt = (
-            self._add(name) for name in (self.fastener.into, self.fastener.clamps, BOLT)
+            self._add(name) for name in (self.screw.into, self.screw.clamps, BOLT)
         )
         self.plant.WeldFrames(self.plant.world_frame(), self.motor.body_frame())
         (tool,) = new_parser(self.plant).AddModelsFromUrl(model_url("screwdriver"))
-        set_driver_gains(self.plant, tool)
+        self.driver = Driver.add(self.plant, tool, "spindle", drive)
         carriage = self._add_carriage()
         X_CM = RigidTransform(RotationMatrix.MakeXRotation(np.pi), np.zeros(3))
         mount = self.plant.GetFrameByName("mount", tool)
@@ -57,21 +62,23 @@ class ThreadRig:
             self.plant.set_gravity_enabled(instance, False)
         self.plant.AddModelInstance("threads")
         X_AH = self.product.parts[BOLT].X_AP
-        self.bit = self.plant.GetFrameByName("bit_tip", tool)
+        self.bit = self.driver.bit_frame
+        set_head_friction(self.plant, scene_graph, self.screw, self.bolt, self.plate)
         self.thread = add_thread(
-            self.plant, scene_graph, self.fastener, self.bolt, self.motor, X_AH, self.bit
+            self.plant, scene_graph, self.screw, self.bolt, self.motor, X_AH, self.bit
         )
         self.plant.Finalize()
-        self.feed = Drive.connect(builder, self.plant, self.carriage, np.zeros(3))
-        self.driver = connect_driver(builder, self.plant, tool)
+        self.feed.connect(builder, self.plant, self.carriage)
+        drive.connect(builder, self.plant, tool)
+        self.threads = builder.AddNamedSystem("threads", Threads({BOLT: self.thread}, self.driver))
         self.simulator = Simulator(builder.Build())
+        self.simulator.set_monitor(Monitor(counter, self.threads.reset, [self.threads]))
         self.root = self.simulator.get_mutable_context()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
-        X_WBolt = X_AH @ RigidTransform([0.0, 0.0, self.fastener.thread_depth])
+        X_WBolt = X_AH @ RigidTransform([0.0, 0.0, self.screw.thread_depth])
         self.plant.SetFreeBodyPose(self.context, self.bolt, X_WBolt)
         self.seated_bit = X_WBolt.translation() + [0.0, 0.0, BIT_SEAT]
         self.put_bit(self.seated_bit + [0.0, 0.0, 0.02])
-        self.thread.reset(self.root)
         self.simulator.Initialize()
 
     def _add(self, part: str) -> RigidBody:

@@ -32,6 +32,8 @@ from cell.simulation.phase import (
 # inertia of 0.1 kg m^2 at a lever of 0.15 to 0.4 m [D].
 EFFECTIVE_MASS = 5.0
 EFFECTIVE_INERTIA = 0.15
+# Of what an arm with more than six joints can do without moving its hand [N m s/rad] [A].
+SELF_MOTION_DAMPING = 10.0
 
 
 class Simulation:
@@ -243,14 +245,22 @@ class _PhaseRun:
 
 
 def impedance_torque(arm: Arm, context: Context, command: Impedance, t: float) -> np.ndarray:
-    """Joint torques (6,) of a Cartesian impedance with critical damping, in the axes of W."""
+    """Joint torques (n,) of a Cartesian impedance with critical damping, in the axes of W.
+
+    An arm with more joints than six is damped where it can move without moving the hand.
+    """
     X_WC = command.frame.CalcPoseInWorld(context) @ command.X_FC
     X_WD = command.X_WD(t)
     jacobian = arm.jacobian(context, command.frame, command.X_FC.translation())
+    v = arm.velocities(context)
     turn = (X_WD.rotation() @ X_WC.rotation().inverse()).ToAngleAxis()
     error = np.concatenate([turn.angle() * turn.axis(), X_WD.translation() - X_WC.translation()])
     spring = np.clip(command.stiffness * error, -command.limit, command.limit)
     mass = np.repeat([EFFECTIVE_INERTIA, EFFECTIVE_MASS], 3)
     damping = 2.0 * np.sqrt(command.stiffness * mass)
-    wrench = spring - damping * (jacobian @ arm.velocities(context)) + command.bias
-    return np.clip(jacobian.T @ wrench, -arm.effort_limits, arm.effort_limits)
+    wrench = spring - damping * (jacobian @ v) + command.bias
+    torque = jacobian.T @ wrench
+    if arm.dof > 6:
+        still = np.eye(arm.dof) - np.linalg.pinv(jacobian) @ jacobian
+        torque -= SELF_MOTION_DAMPING * still @ v
+    return np.clip(torque, -arm.effort_limits, arm.effort_limits)

@@ -80,7 +80,7 @@ class Threads(LeafSystem):
     def turns(self, root: Context, bolt: str) -> float:
         """Return the turns of a bolt since its thread caught, positive for tightening."""
         thread = self._threads[bolt]
-        angle = thread.screw.get_rotation(thread.plant.GetMyContextFromRoot(root))
+        angle = thread.joint.get_rotation(thread.plant.GetMyContextFromRoot(root))
         return (self.engagements(root)[bolt].caught_angle - angle) / (2 * np.pi)
 
     # Simulation.

@@ -2,55 +2,35 @@
 
 from __future__ import annotations
 
-from pathlib import Path
-
 from rich.console import Console
 
-from cell.configuration.config import CellConfig
-from cell.products.product import Product
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
-from experiments.assembly.prepare import check_models, running_cell
+from experiments.assembly.prepare import running_cell
 from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.replay import Replay
 from experiments.assembly.results import write_infeasible, write_results
 from experiments.assembly.run import Run, go_on, read_final_state
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
-from planning.operations.sequence import NoOperation, Operation, operations
+from planning.operations.operation import NoOperation, Step
+from planning.operations.sequence import steps
 
 
-def run_assemble(
-    *,
-    product: Product,
-    order: tuple[str, ...] | None,
-    config: CellConfig,
-    seed: int,
-    out: Path,
-    view: bool,
-    replay: Path | None,
-    quiet: bool,
-) -> int:
-    """Plan a product and run its whole assembly; write result, log and report.
-
-    The arguments are those of `Job`.
+def run_job(job: Job) -> int:
+    """Plan, run, measure and report; write result, log and report.
 
     Returns:
         0 if the whole assembly succeeded, else 1.
 
     Raises:
-        CellError: Product or order cannot be used; nothing is written.
+        InputError: Product, order or state cannot be used; nothing is written.
     """
-    return run_job(Job(product, order, config, seed, out, view, replay, quiet))
-
-
-def run_job(job: Job) -> int:
-    """Plan, run, measure and report; return 0 if everything succeeded, else 1."""
     console = Console(quiet=job.quiet, highlight=False)
-    check_models(job.product)
+    job.product.check_simulable()
     fixing = plan(job.product, job.order)
     try:
-        todo = _operations(job, fixing)
+        todo = _steps(job, fixing)
     except NoOperation as reason:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
@@ -63,7 +43,7 @@ def run_job(job: Job) -> int:
     if start is not None:
         todo = go_on(run, todo, start)
     pictures = Pictures(run.simulation)
-    with Progress(console, [operation.name for operation in todo]) as progress:
+    with Progress(console, [step.name for step in todo]) as progress:
         run.watchers = (progress, pictures)
         run.run(todo)
     write_results(job, fixing, run, pictures)
@@ -75,14 +55,14 @@ def run_job(job: Job) -> int:
     return 0 if run.verdict == "success" else 1
 
 
-def _operations(job: Job, fixing: FixingPlan) -> list[Operation]:
-    """Return the operations of a feasible plan, up to the last one wanted.
+def _steps(job: Job, fixing: FixingPlan) -> list[Step]:
+    """Return the steps of a feasible plan, up to the first of the operation wanted last.
 
     Raises:
         NoOperation: The plan is infeasible, or no operation carries it out.
     """
     if fixing.stop is not None:
         raise NoOperation(stop_text(fixing))
-    todo = operations(job.product, fixing)
-    kinds = [operation.kind for operation in todo]
-    return todo[: kinds.index(job.last) + 1] if job.last in kinds else todo
+    todo = steps(job.product, fixing)
+    operations = [step.operation for step in todo]
+    return todo[: operations.index(job.last) + 1] if job.last in operations else todo

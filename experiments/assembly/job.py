@@ -7,6 +7,7 @@ from pathlib import Path
 
 from cell.configuration.config import CellConfig
 from cell.products.product import Product
+from planning.operations.operation import Operation
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Job:
         replay: Where to write a recording; None for none.
         quiet: Whether to print nothing.
         command: What is recorded as the command.
-        last: Kind of the operation to stop after; None for the whole assembly.
+        last: The operation to stop after; None for the whole assembly.
         start: Where an earlier run saved its last state, to go on from there; None: from nothing.
     """
 
@@ -36,5 +37,5 @@ class Job:
     replay: Path | None = None
     quiet: bool = False
     command: str = "assemble"
-    last: str | None = None
+    last: Operation | None = None
     start: Path | None = None

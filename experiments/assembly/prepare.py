@@ -9,11 +9,11 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell.builder import add_cell
 from cell.configuration.config import CellConfig
-from cell.errors import CellError
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 from experiments.assembly.replay import Replay
 from planning.operations.station import Station
+from planning.perception.belief import TruthSource
 
 
 @dataclass(frozen=True)
@@ -50,20 +50,9 @@ class Disturbance:
         return replace(config, workcell=tray)
 
 
-def check_models(product: Product) -> None:
-    """Raise `CellError` for a product that can be planned only, not simulated."""
-    bare = [p.name for p in product.parts.values() if p.model is None or p.X_TrayP is None]
-    if bare:
-        raise CellError(
-            f"Product '{product.name}' can be planned, but not assembled in the twin: "
-            f"{', '.join(bare)} has no simulation model or no place in a tray. "
-            f"A product file gives both; see models/products/motor_unit.yaml."
-        )
-
-
 def running_cell(
     product: Product, config: CellConfig, seed: int, replay: Replay | None = None
-) -> tuple[Simulation, Station]:
+) -> tuple[Simulation, Station, Disturbance]:
     """Build the disturbed cell, and the planner's undisturbed view of it.
 
     Args:
@@ -71,11 +60,16 @@ def running_cell(
         config: Every number of the cell, as the planner believes it to be.
         seed: Seeds disturbance, sensor noise and sampling planners.
         replay: Where to show it, if at all.
+
+    Returns:
+        The running cell, the planner's view, and the disturbance between them.
     """
     builder = DiagramBuilder()
-    cell = add_cell(builder, Disturbance.draw(config, seed).applied_to(config), product)
+    disturbance = Disturbance.draw(config, seed)
+    cell = add_cell(builder, disturbance.applied_to(config), product)
     if replay is not None:
         replay.add_to(builder, cell)
-    simulation = Simulation(replace(cell, diagram=builder.Build()), seed)
-    station = Station(simulation.cell, simulation.context, simulation.sense, seed, nominal=config)
-    return simulation, station
+    simulation = Simulation(replace(cell, diagram=builder.Build()))
+    source = TruthSource.of(simulation.cell, simulation.root, seed)
+    station = Station(simulation.cell, simulation.root, source, seed, nominal=config)
+    return simulation, station, disturbance

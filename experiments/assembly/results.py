@@ -5,27 +5,21 @@ from __future__ import annotations
 from dataclasses import asdict
 from typing import Any
 
-import numpy as np
-
 from cell.simulation.state import State
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
-from experiments.assembly.prepare import Disturbance
 from experiments.assembly.run import Run, StepResult, final_state
-from experiments.metrics.bolts import thread_curve
-from experiments.metrics.insert import INSERTION_PHASES, insertion_curve
-from experiments.metrics.record import Arrays, OperationRecord, rows_of
 from experiments.reporting.html_page import Picture
 from experiments.reporting.output import write_arrays, write_json
-from experiments.reporting.plots import plot_force_plate, plot_insertion_force, plot_torque
+from experiments.reporting.plots import draw, plot_force_plate
 from experiments.reporting.provenance import finite, versions
 from experiments.reporting.report import write_report
 from planning.assembly_plan.plan_file import plan_to_dict
 from planning.assembly_plan.planner import FixingPlan
+from planning.operations.record import Arrays
 
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 
-LAST = np.pi / 4  # The tightening takes place within this angle before the trip [rad].
 ASLEEP = "A part that rests while nothing touches it sleeps: the force plate does not feel it then."
 
 
@@ -91,7 +85,7 @@ def _result(job: Job, fixing: FixingPlan, run: Run) -> dict[str, Any]:
         "steps": [_step(step) for step in run.steps],
         "real_time_factor": (simulation.time - began) / max(simulation.stepping_cpu, 1e-9),
         "sim_seconds": simulation.time - began,
-        "disturbance": asdict(Disturbance.draw(job.config, job.seed)),
+        "disturbance": asdict(run.disturbance),
     }
     if run.failure is not None:
         result["failure"] = {
@@ -124,38 +118,10 @@ def _notes(run: Run, pictures: Pictures) -> list[str]:
 def _plots(run: Run, log: Arrays) -> list[Picture]:
     if "time" not in log:
         return []
-    starts = [(record.operation.name, record.start.time) for record in run.records]
+    starts = [(record.step.name, record.start.time) for record in run.records]
     force = log["force_plate"][:, 3:] - log["force_plate"][0, 3:]
     plots = [("Force plate", plot_force_plate(log["time"], force, starts))]
     for record in run.records:
-        fit = record.operation.fit
-        if fit is not None and record.named(fit.hole, *INSERTION_PHASES):
-            depth, force = insertion_curve(run.simulation.cell, record, log)
-            limit = run.station.config.insertion.force_limit
-            plots.append((record.operation.name, plot_insertion_force(depth, force, limit)))
-        if record.operation.kind == "tighten_bolts":
-            plots += _torque_plots(run, record, log)
+        for plot in record.step.operation.plots(run.simulation.cell, record, log):
+            plots.append((plot.caption, draw(plot)))
     return plots
-
-
-def _torque_plots(run: Run, record: OperationRecord, log: Arrays) -> list[Picture]:
-    """Return torque over angle from the catch of the thread, and the end of it, from the trip."""
-    angles: dict[str, np.ndarray] = {}
-    torques: dict[str, np.ndarray] = {}
-    for bolt in record.operation.parts:
-        phases = record.named(bolt, "run down", "tighten")
-        if len(phases) == 2:
-            rows = rows_of(log, phases)
-            angles[bolt], _, clamp = thread_curve(run.simulation.cell, bolt, rows)
-            torques[bolt] = rows["spindle_torque"][-len(clamp) :]
-    if not angles:
-        return []
-    fasteners = run.station.cell.product.fasteners
-    target = fasteners[record.operation.parts[0]].torque
-    whole = {bolt: angle - angle[0] for bolt, angle in angles.items()}
-    last = {bolt: (angle - angle[-1])[angle > angle[-1] - LAST] for bolt, angle in angles.items()}
-    ends = {bolt: torques[bolt][-len(angle) :] for bolt, angle in last.items()}
-    return [
-        ("Tightening, from the thread's catch", plot_torque(whole, torques, target)),
-        ("Tightening, up to the clutch's trip", plot_torque(last, ends, target)),
-    ]

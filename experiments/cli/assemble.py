@@ -5,12 +5,15 @@ from __future__ import annotations
 import contextlib
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
 from experiments.cli.common import Common, split_order
 from experiments.reporting.output import output_folder
+
+if TYPE_CHECKING:
+    from planning.operations.operation import Operation
 
 
 @dataclass(frozen=True)
@@ -23,6 +26,12 @@ class Assemble:
     order: Annotated[str | None, arg(metavar="A,B,C")] = None
     """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
 
+    fixture: Annotated[str | None, arg(metavar="NAME")] = None
+    """What holds the parts: soft_jig, flat_plate. Default: workcell.fixture."""
+
+    start: Annotated[Path | None, arg(metavar="STATE.npz")] = None
+    """Go on from the state.npz of an earlier run with the same product, order and seed."""
+
     view: bool = False
     """Show the run in a browser while it goes on."""
 
@@ -33,15 +42,24 @@ class Assemble:
 
     def run(self) -> int:
         """Write ``result.json``, ``log.npz`` and ``report.html``; return the exit code."""
-        config = self.common.load_config()
+        return self.run_as("assemble")
+
+    def run_as(self, command: str, last: Operation | None = None) -> int:
+        """Run under the name of a command or script, up to an operation; return the exit code.
+
+        Raises:
+            InputError: Something that was given cannot be used; nothing is written.
+        """
+        config = self.common.load_config(self.fixture)
         with contextlib.ExitStack() as folders:
             out = folders.enter_context(output_folder(self.common.out))
             if self.replay is not None:
                 folders.enter_context(output_folder(self.replay.absolute().parent))
             from cell.products.loading import load_product
-            from experiments.assembly.assemble import run_assemble
+            from experiments.assembly.assemble import run_job
+            from experiments.assembly.job import Job
 
-            return run_assemble(
+            job = Job(
                 product=load_product(self.product),
                 order=split_order(self.order),
                 config=config,
@@ -50,4 +68,8 @@ class Assemble:
                 view=self.view,
                 replay=self.replay,
                 quiet=self.common.quiet,
+                command=command,
+                last=last,
+                start=self.start,
             )
+            return run_job(job)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import UseAppendAction, arg
 
-from cell.errors import CellError
+from cell.errors import InputError
 
 if TYPE_CHECKING:
     from cell.configuration.config import CellConfig
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 # What a command needs is imported when it runs: Drake takes a second that --help can do without.
 
 
-class BadUsage(CellError):
+class BadUsage(InputError):
     """A command line that cannot be understood."""
 
 
@@ -41,13 +41,22 @@ class Common:
     quiet: bool = False
     """Print nothing but errors."""
 
-    def load_config(self) -> CellConfig:
-        """Return the configuration that the options describe, checked."""
+    def load_config(self, fixture: str | None = None) -> CellConfig:
+        """Return the configuration that the options describe, checked.
+
+        Args:
+            fixture: Name of another fixture than the configuration's; None leaves it.
+        """
         from cell.configuration.config import CellConfig
+        from cell.fixtures import fixture_class
 
         if self.seed < 0:
             raise BadUsage(f"--seed must be >= 0, not {self.seed}.")
-        return CellConfig.load(self.config, self.overrides)
+        config = CellConfig.load(self.config, self.overrides)
+        if fixture is not None:
+            config = config.with_changes({"workcell.fixture": fixture})
+        fixture_class(config.workcell.fixture)
+        return config
 
 
 def split_order(text: str | None) -> tuple[str, ...] | None:

@@ -11,11 +11,12 @@ import io
 import re
 import sys
 from collections.abc import Sequence
+from importlib.metadata import version
 
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
-from cell.errors import CellError, UnknownName
+from cell.errors import InputError, RunFailure, UnknownName
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
 from experiments.cli.paper import Place, Push, Regress
@@ -40,9 +41,12 @@ def parse(arguments: Sequence[str]) -> Command:
 
     Raises:
         BadUsage: Or `UnknownName` for a command that does not exist.
-        SystemExit: With code 0, after printing the help that was asked for.
+        SystemExit: With code 0, after printing help or version.
     """
     command = arguments[0] if arguments else ""
+    if command == "--version":
+        print(f"soft-jig {version('soft-jig-cell')}, Drake {version('drake')}")
+        raise SystemExit(0)
     if not command:
         raise BadUsage(f"A command is missing. Known: {', '.join(COMMANDS)}. See soft-jig --help.")
     if command not in COMMANDS and command not in ("-h", "--help"):
@@ -84,6 +88,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
     try:
         return parse(sys.argv[1:] if arguments is None else arguments).run()
-    except CellError as error:
+    except InputError as error:
         print(f"soft-jig: {error}", file=sys.stderr)
         return 2
+    except RunFailure as error:
+        print(f"soft-jig: {error}", file=sys.stderr)
+        return 1

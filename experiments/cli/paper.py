@@ -27,8 +27,8 @@ class Place:
     pressure: Annotated[float | None, arg(metavar="KPA")] = None
     """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
 
-    bed: Literal["soft", "rigid"] = "soft"
-    """What the part is pressed on: the soft jig, or a flat rigid block in its place."""
+    fixture: Annotated[str | None, arg(metavar="NAME")] = None
+    """What the part is put on: soft_jig, flat_plate. Default: workcell.fixture."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
@@ -53,8 +53,8 @@ class Push:
     pressure: Annotated[float | None, arg(metavar="KPA")] = None
     """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
 
-    bed: Literal["soft", "rigid"] = "soft"
-    """What the part is pressed on: the soft jig, or a flat rigid block in its place."""
+    fixture: Annotated[str | None, arg(metavar="NAME")] = None
+    """What the part is put on: soft_jig, flat_plate. Default: workcell.fixture."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
@@ -89,20 +89,17 @@ class Regress:
 def _run_experiment(command: str, options: Place | Push) -> int:
     """Check everything that was asked for, then run it."""
     from experiments.paper.case_results import Experiment
-    from experiments.paper.cases import check_hand
     from experiments.paper.place_push import cases_of, check_trials, run_experiment, with_pressure
 
     common = options.common
-    config = with_pressure(common.load_config(), options.pressure)
+    config = with_pressure(common.load_config(options.fixture), options.pressure)
     check_trials(options.trials)
-    check_hand(options.hand, options.bed)
     cases_of(command, options.case)
     with output_folder(common.out) as out:
         experiment = Experiment(
             command,
             config,
             options.hand,
-            options.bed,
             options.trials,
             common.seed,
             out,

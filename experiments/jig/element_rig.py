@@ -14,7 +14,6 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import (
     AddMultibodyPlant,
-    ExternallyAppliedSpatialForce,
     MultibodyPlantConfig,
 )
 from pydrake.multibody.tree import (
@@ -25,7 +24,10 @@ from pydrake.multibody.tree import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cell.fixtures.soft_jig import JigParameters, JigState, SoftJig, SurfaceSamples
+from cell.fixtures.soft_jig import JigParameters, SoftJig
+from cell.fixtures.wiring import wire_fixture
+from cell.forces import applied_force
+from cell.monitor import Monitor, StepCounter
 from experiments.jig.specimens import Prism, Specimen
 
 Array = NDArray[np.float64]
@@ -79,6 +81,7 @@ class ElementRig:
 
     def __post_init__(self) -> None:
         builder = DiagramBuilder()
+        counter = builder.AddNamedSystem("steps", StepCounter(self.time_step))
         config = MultibodyPlantConfig(
             time_step=self.time_step,
             contact_model="hydroelastic_with_fallback",
@@ -87,18 +90,17 @@ class ElementRig:
         self.plant, self.scene_graph = AddMultibodyPlant(config, builder)
         base = self.plant.AddRigidBody("base", SpatialInertia.SolidBoxWithMass(1.5, 0.2, 0.2, 0.02))
         self.plant.WeldFrames(self.plant.world_frame(), base.body_frame())
-        self.jig = SoftJig.add(self.plant, self.scene_graph, base, self.params)
+        self.jig = SoftJig(self.plant, self.scene_graph, base, self.params)
         self.body = self.part.add_to(self.plant)
         self._X_CP = self.part.X_CP
         self._add_carriage()
         self.plant.Finalize()
+        self._forces = wire_fixture(builder, self.plant, self.scene_graph, self.jig, [base]).forces
         self.simulator = Simulator(builder.Build())
+        self.simulator.set_monitor(Monitor(counter, self.jig.install, [self.jig]))
         self.root = self.simulator.get_mutable_context()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
-        self.jig.press_with(self.body, SurfaceSamples.of("part", self.part.mesh()))
-        self.jig.inflate(self.root)
-        self.jig.soften(self.root)
-        self._pull: list[ExternallyAppliedSpatialForce] = []
+        self.jig.receive(self.root, self.body, self.part.mesh())
         self._steps = 0
         self._height = self.params.bag.cap_height + 0.5e-3
         self._set_height(self._height, 0.0)
@@ -138,12 +140,9 @@ class ElementRig:
 
     def step(self, count: int = 1) -> None:
         """Advance by some steps."""
-        port = self.plant.get_applied_spatial_force_input_port()
         for _ in range(count):
             self._steps += 1
-            port.FixValue(self.context, self.jig.applied_forces + self._pull)
             self.simulator.AdvanceTo(self._steps * self.time_step)
-            self.jig.step(self.root, self.time_step)
 
     def lower_to(self, depth: float, speed: float = 0.02) -> Array:
         """Press the part to a depth below the apex [m]; return depth and force rows (n, 2)."""
@@ -159,13 +158,13 @@ class ElementRig:
     @property
     def bed_force(self) -> float:
         """Upward force of the soft bed on the part [N]."""
-        forces = self.jig.applied_forces
+        forces = self.jig.memory(self.root).forces
         return float(forces[0].F_Bq_W.translational()[2]) if forces else 0.0
 
     def jam(self) -> None:
         """Evacuate until the pressure is there, then hold the place instead of pressing on."""
         self.jig.evacuate(self.root)
-        while self.jig.state is not JigState.JAMMED:
+        while not self.jig.fixed(self.root):
             self.step()
         self._set_height(self.params.bag.cap_height - self.depth, 0.0)
         self.step(round(0.5 / self.time_step))
@@ -185,24 +184,18 @@ class ElementRig:
             force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (
                 speed - self._rate(p_PQ, direction)
             )
-            self._pull = [self._force_at(p_PQ, max(force, 0.0) * direction)]
+            pull = SpatialForce(np.zeros(3), max(force, 0.0) * direction)
+            self._forces.fix(self.root, "external", [applied_force(self.body.index(), p_PQ, pull)])
             self.step()
             turn = (R_JP0.inverse() @ self.X_JP.rotation()).ToAngleAxis().angle()
             rows.append((moved, max(force, 0.0), turn))
-        self._pull = []
+        self._forces.fix(self.root, "external", [])
         return Drag(*np.array(rows).T)
 
     def _rate(self, p_PQ: Array, direction: Array) -> float:
         V_WP = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.body)
         arm = self.X_JP.rotation() @ p_PQ
         return float(direction @ V_WP.Shift(arm).translational())
-
-    def _force_at(self, p_PQ: Array, force: Array) -> ExternallyAppliedSpatialForce:
-        applied = ExternallyAppliedSpatialForce()
-        applied.body_index = self.body.index()
-        applied.p_BoBq_B = p_PQ
-        applied.F_Bq_W = SpatialForce(np.zeros(3), force)
-        return applied
 
     @property
     def speed(self) -> float:

@@ -59,7 +59,6 @@ class Experiment:
         command: "place" or "push".
         config: Every number.
         hand: "rig" or "robot".
-        bed: "soft" or "rigid".
         trials: Of each case.
         seed: Of the disturbances.
         out: Existing folder for the results.
@@ -69,7 +68,6 @@ class Experiment:
     command: str
     config: CellConfig
     hand: str
-    bed: str
     trials: int
     seed: int
     out: Path
@@ -114,7 +112,6 @@ def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, 
         "order": [],
         "seed": experiment.seed,
         "hand": experiment.hand,
-        "bed": experiment.bed,
         "verdict": verdict(results),
         "cases": [_case(result) for result in results],
         "by_outcome": _compared(results),

@@ -10,7 +10,6 @@ import numpy as np
 from scipy.stats import binomtest
 
 from cell.configuration.config import CellConfig
-from cell.errors import CellError
 from cell.products.product import Product
 from experiments.paper.postures import Posture, Push
 from experiments.paper.rig.stage import Observer
@@ -120,7 +119,6 @@ def run_cases(
     *,
     product: Product,
     config: CellConfig,
-    bed: str,
     trials: int,
     seed: int,
     hand: str = "rig",
@@ -132,21 +130,18 @@ def run_cases(
         cases: Which.
         product: Where the parts are described.
         config: Every number, the same for all cases.
-        bed: "soft" or "rigid".
         trials: Of each case.
         seed: Seeds the disturbances: the same for both hands.
         hand: "rig" or "robot".
         watch: Told of the events of the first trial of each case.
 
     Raises:
-        CellError: Before any trial: a part that has no room on the bag (`BadPart`), or a bed that
-            the hand cannot be had with.
+        InputError: Before any trial: a part that has no room on the bag (`BadPart`).
     """
-    check_hand(hand, bed)
     for case in cases:
         check_fits(config, product.parts[case.posture.part], case.posture)
     for case in cases:
-        bench = _bench(case, product, config, bed, hand)
+        bench = _bench(case, product, config, hand)
         result = CaseResult(case)
         for k in range(trials):
             disturbance = Disturbance.draw(config, case_seed(seed, case.label, k))
@@ -156,19 +151,11 @@ def run_cases(
             yield result, result.trials[-1]
 
 
-def check_hand(hand: str, bed: str) -> None:
-    """Raise `CellError` for a bed that a hand cannot be had with."""
-    if hand == "robot" and bed != "soft":
-        raise CellError(
-            f"--bed {bed} is for --hand rig: the cell that --hand robot works in has the soft jig."
-        )
-
-
-def _bench(case: Case, product: Product, config: CellConfig, bed: str, hand: str) -> Bench:
+def _bench(case: Case, product: Product, config: CellConfig, hand: str) -> Bench:
     """Build what a case's trials are run with; cheap beside a trial."""
     if hand == "robot":
         return RobotBench.build(config, product, case.posture, case.push)
-    return RigBench.build(config, product, case.posture, bed)
+    return RigBench.build(config, product, case.posture)
 
 
 def _bound(watch: Callable[[Case, str, Observer], None], case: Case) -> Callable:

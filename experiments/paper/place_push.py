@@ -7,7 +7,7 @@ from rich.console import Console
 from rich.progress import Progress
 
 from cell.configuration.config import CellConfig
-from cell.errors import CellError
+from cell.errors import InputError
 from cell.products.loading import load_product
 from experiments.paper.case_results import Experiment, case_table, verdict, write_case_results
 from experiments.paper.cases import Case, CaseResult, run_cases
@@ -38,9 +38,9 @@ def with_pressure(config: CellConfig, pressure_kpa: float | None) -> CellConfig:
 
 
 def check_trials(trials: int) -> None:
-    """Raise `CellError` unless there is something to do."""
+    """Raise `InputError` unless there is something to do."""
     if trials < 1:
-        raise CellError(f"--trials must be at least 1, not {trials}.")
+        raise InputError(f"--trials must be at least 1, not {trials}.")
 
 
 def run_experiment(experiment: Experiment, label: str | None) -> int:
@@ -60,7 +60,6 @@ def run_experiment(experiment: Experiment, label: str | None) -> int:
             cases,
             product=load_product("motor_unit"),
             config=experiment.config,
-            bed=experiment.bed,
             trials=experiment.trials,
             seed=experiment.seed,
             hand=experiment.hand,

@@ -4,19 +4,22 @@ from __future__ import annotations
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.systems.framework import Context
 
 from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import AXES, MM, Push
 from experiments.paper.reach import Fingers
 from experiments.paper.rig.stage import Stage
-from planning.operations.push import PushLine
+from planning.operations.push.phases import PushLine
 from planning.operations.stroke import Stroke
 
 # Least horizontal part of a unit direction that a push can follow: the part lies 84 deg askew.
 LEVEL = 0.1
 
 
-def push_line(stage: Stage, push: Push, X_WJ: RigidTransform, X_WP: RigidTransform) -> PushLine:
+def push_line(
+    stage: Stage, root: Context, push: Push, X_WJ: RigidTransform, X_WP: RigidTransform
+) -> PushLine:
     """Return the straight line of the closed hand's frame T that a push takes.
 
     The one rule for all cases: the fingers' lowest point at `height_fraction` of the exposed height
@@ -25,6 +28,7 @@ def push_line(stage: Stage, push: Push, X_WJ: RigidTransform, X_WP: RigidTransfo
 
     Args:
         stage: Part, jig and hand.
+        root: Context of the diagram.
         push: Which push.
         X_WJ: Where the jig is, or is expected to be.
         X_WP: The same of the part.
@@ -38,11 +42,11 @@ def push_line(stage: Stage, push: Push, X_WJ: RigidTransform, X_WP: RigidTransfo
     if np.hypot(*direction[:2]) < LEVEL:
         raise PhaseFailed("approach", "the part lies on the side it is to be pushed from")
     direction = np.array([direction[0], direction[1], 0.0]) / np.hypot(*direction[:2])
-    bed = bed_height(stage, X_WJ, foot[:2])
+    bed = bed_height(stage, root, X_WJ, foot[:2])
     low = max(foot[2], bed)
     height = max(low + numbers.height_fraction * (top[2] - low), bed + numbers.bed_clearance)
     fingers = Fingers.of_hand(stage)
-    travel = fingers.travel(X_WP @ stage.samples.points.T, top[:2], height, direction)
+    travel = fingers.travel(X_WP @ stage.surface.T, top[:2], height, direction)
     if not np.isfinite(travel):
         raise PhaseFailed("approach", "the closed hand would pass the part without a touch")
     p_WT = np.array([*top[:2], height + fingers.below_tip])
@@ -57,12 +61,12 @@ def leading(direction: np.ndarray) -> RotationMatrix:
     return RotationMatrix.MakeZRotation(turn) @ RotationMatrix.MakeXRotation(np.pi)
 
 
-def bed_height(stage: Stage, X_WJ: RigidTransform, p_WQ: np.ndarray, radius: float = 5e-3) -> float:
-    """Return the highest the bed stands in W around a point (2,) [m]."""
-    if stage.soft_jig is None:
-        return float(X_WJ.translation()[2] + stage.config.jig.bag.cap_height)
+def bed_height(
+    stage: Stage, root: Context, X_WJ: RigidTransform, p_WQ: np.ndarray, radius: float = 5e-3
+) -> float:
+    """Return the highest the fixture stands in W around a point (2,) [m]."""
     p_JQ = X_WJ.inverse() @ np.array([*p_WQ, X_WJ.translation()[2]])
     ring = np.linspace(0, 2 * np.pi, 12, endpoint=False)
     around = p_JQ[:2] + radius * np.column_stack([np.cos(ring), np.sin(ring)])
-    heights = stage.soft_jig.bed.height_at(np.vstack([p_JQ[:2], around]))
+    heights = stage.fixture.height_at(root, np.vstack([p_JQ[:2], around]))
     return float(X_WJ.translation()[2] + heights.max())

@@ -10,6 +10,7 @@ from __future__ import annotations
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +18,7 @@ from rich.console import Console
 from rich.table import Table
 
 from cell.configuration.config import CellConfig
-from cell.errors import CellError
+from cell.errors import InputError
 from cell.paths import MODELS
 from cell.products.loading import load_product
 from experiments.paper.cases import Case, CaseResult, run_cases
@@ -146,7 +147,6 @@ def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, C
             cases,
             product=load_product("motor_unit"),
             config=config,
-            bed="soft",
             trials=suite.trials,
             seed=SEED,
         )
@@ -157,18 +157,19 @@ def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, C
     return results
 
 
-def read_baseline(path: Path) -> Metrics:
-    """Read stored metrics.
+def read_baseline(path: Path) -> tuple[Metrics, str]:
+    """Read stored metrics, and the version of Drake that they hold for.
 
     Raises:
-        CellError: There are none, or they cannot be read.
+        InputError: There are none, or they cannot be read.
     """
     try:
-        return json.loads(path.read_text(encoding="utf-8"))["cases"]
+        stored = json.loads(path.read_text(encoding="utf-8"))
+        return stored["cases"], str(stored["drake"])
     except FileNotFoundError:
-        raise CellError(f"No stored metrics '{path}': make them with --update.") from None
+        raise InputError(f"No stored metrics '{path}': make them with --update.") from None
     except (OSError, ValueError, KeyError) as error:
-        raise CellError(f"Cannot read the stored metrics '{path}': {error}.") from error
+        raise InputError(f"Cannot read the stored metrics '{path}': {error}.") from error
 
 
 def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, quiet: bool) -> int:
@@ -179,7 +180,11 @@ def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, qu
     """
     console = Console(quiet=quiet, highlight=False)
     suite, path = SUITES[suite_name], BASELINE / f"{suite_name}.json"
-    stored = {} if update and not path.exists() else read_baseline(path)
+    drake = version("drake")
+    stored, of_drake = ({}, drake) if update and not path.exists() else read_baseline(path)
+    if of_drake != drake:
+        text = f"The stored metrics hold for Drake {of_drake}; this is {drake}."
+        console.print(text, markup=False, soft_wrap=True)
     now = metrics_of(run_suite(suite, config, console))
     rows = drifts(stored, now)
     shown = [row for row in rows if row.stored != row.now] if update else rows
@@ -187,7 +192,7 @@ def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, qu
     good = all(row.ok for row in rows)
     if update:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_json(path, {"suite": suite_name, "seed": SEED, "cases": now})
+        write_json(path, {"suite": suite_name, "seed": SEED, "drake": drake, "cases": now})
     write_json(out / "result.json", _result(suite_name, update or good, rows, config))
     return 0 if update or good else 1
 

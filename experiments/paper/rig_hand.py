@@ -16,8 +16,8 @@ from experiments.paper.rig.rig_simulation import RigSimulation
 from experiments.paper.rig.stage import Observer
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
-from planning.operations.pick_place import DEEPEST, JAM_TIME, PRESS_SPEED
-from planning.operations.push import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
+from planning.operations.pick_place.phases import DEEPEST, JAM_TIME, PRESS_SPEED
+from planning.operations.push.phases import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
 
 HOLD_TIME = 0.2  # The hand stays this long after the bag has frozen [s] [A].
 RETREAT = 0.08
@@ -45,9 +45,9 @@ class RigBench:
     posture: Posture
 
     @staticmethod
-    def build(config: CellConfig, product: Product, posture: Posture, bed: str) -> RigBench:
-        """Build it; ``bed`` is "soft" or "rigid"."""
-        return RigBench(build_push_rig(config, product, posture.part, bed), posture)
+    def build(config: CellConfig, product: Product, posture: Posture) -> RigBench:
+        """Build it."""
+        return RigBench(build_push_rig(config, product, posture.part), posture)
 
     def begin(self, disturbance: Disturbance) -> RigHand:
         """Put a stand with the part over the jig, and the open hand around it."""
@@ -95,14 +95,14 @@ class RigHand:
         if not simulation.lower(PRESS_SPEED, HOVER + DEEPEST, force):
             raise PhaseFailed("press", f"no resistance within {DEEPEST * 1e3:g} mm")
         simulation.begin("jam")
-        simulation.evacuate()
+        simulation.fix()
         for _ in range(round(JAM_TIME / simulation.time_step)):
             simulation.step()
-            if simulation.frozen:
+            if simulation.fixed:
                 break
         simulation.wait(HOLD_TIME)
-        if not simulation.frozen:
-            raise PhaseFailed("jam", f"the bag is still soft after {JAM_TIME:g} s")
+        if not simulation.fixed:
+            raise PhaseFailed("jam", f"the fixture does not hold after {JAM_TIME:g} s")
 
     def _grip(self) -> None:
         """Take the part from its stand."""
@@ -111,7 +111,7 @@ class RigHand:
         simulation.wait(READY_TIME)
         simulation.observer.tare()
         simulation.observer.recording = True
-        simulation.jaws(tip_opening(self.grasp), self.grasp.force)
+        simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp), self.grasp.force)
         simulation.wait(GRIP_TIME)
         simulation.rig.let_part_go(simulation.root)
         simulation.wait(0.1)
@@ -120,7 +120,7 @@ class RigHand:
         """Open the jaws and back off along the approach direction."""
         simulation = self.simulation
         simulation.begin("release")
-        simulation.jaws(tip_opening(self.grasp) + CLEARANCE)
+        simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp) + CLEARANCE)
         simulation.wait(RELEASE_TIME)
         start = simulation.pose
         for distance, speed in ((CLEAR, 0.08), (RETREAT, TRAVEL_SPEED)):

@@ -7,31 +7,80 @@ is not looked at again before it is placed; the jig is not quite where it was se
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import Enum
 from typing import cast
 
+import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.builder import Cell, build_cell
 from cell.configuration.config import CellConfig
-from cell.errors import CellError
+from cell.errors import CellError, RunFailure
 from cell.fixtures.soft_jig import SurfaceSamples
-from cell.products.product import Product
+from cell.products.product import Grasp, Product
 from cell.simulation.events import rest_jig, wake_jig
 from cell.simulation.phase import Outcome, Phase, PhaseFailed, after
 from cell.simulation.simulation import Simulation
-from experiments.metrics.common import angle_between
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer, Stage
 from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
-from planning.operations.pick_place import pick_place
-from planning.operations.placement import YAWS, anywhere
-from planning.operations.push import PushLine, approach, can_push, push
+from planning.operations.grasping import HandPhase
+from planning.operations.pick_place.phases import PlacePhase, pick_place
+from planning.operations.placement import anywhere
+from planning.operations.push.phases import PushLine, approach, can_push, push
 from planning.operations.station import Station
+from planning.perception.belief import Estimate, TruthSource
 
-ON_JIG = "press"  # The first phase with the part on the jig.
+
+class TrialPhase(Enum):
+    """What a trial does besides the operations."""
+
+    PICK_READY = "pick: ready"
+    SETTLE = "settle"
+    APPROACH = "approach"
+    READY = "ready"
+    COAST = "coast"
+
+
+@dataclass
+class DrawnSource:
+    """Sees a part that is not quite where it is seen; in the hand, as its grasp says.
+
+    Attributes:
+        truth: What it would see otherwise.
+        X_DrawnP: Pose of the part as it is seen in the part as it is.
+        grasp: How the part will be held.
+        station: Of the planner that looks; None until it is there.
+        duration: See `planning.perception.belief.Source`.
+    """
+
+    truth: TruthSource
+    X_DrawnP: RigidTransform
+    grasp: Grasp
+    station: Station | None = None
+    duration: float = 0.0
+
+    def look(self, parts: Sequence[str]) -> dict[str, Estimate]:
+        """Return where the planner takes parts to be."""
+        seen, station = self.truth.look(parts), self.station
+        if station is not None and station.held is not None:
+            X_WP = station.tool_pose(station.holder, self.grasp.jaw) @ self.grasp.X_PJaw.inverse()
+            return {name: replace(estimate, X_WP=X_WP) for name, estimate in seen.items()}
+        return {
+            name: replace(estimate, X_WP=estimate.X_WP @ self.X_DrawnP)
+            for name, estimate in seen.items()
+        }
+
+    def save(self) -> np.ndarray:
+        """Return the state of what it would see otherwise."""
+        return self.truth.save()
+
+    def restore(self, state: np.ndarray) -> None:
+        """Return to a saved state."""
+        self.truth.restore(state)
 
 
 def presented(product: Product, posture: Posture) -> Product:
@@ -39,7 +88,7 @@ def presented(product: Product, posture: Posture) -> Product:
     part = product.parts[posture.part]
     assert part.X_TrayP is not None
     part = replace(part, X_TrayP=part.X_TrayP @ posture.X_PTurned, grasps=(posture.grasp,))
-    return replace(product, parts={part.name: part}, groups={}, fasteners={}, fits=())
+    return replace(product, parts={part.name: part}, groups={}, joints=())
 
 
 @dataclass(frozen=True)
@@ -67,26 +116,15 @@ class RobotBench:
         cell = build_cell(config, presented(product, posture))
         return RobotBench(cell, _stage(cell, posture.part), posture, push)
 
-    def _sensor(
-        self, simulation: Simulation, station: Station, disturbance: Disturbance
-    ) -> Callable[[str], RigidTransform]:
-        """Return what the planner takes for the pose of the part."""
-        grasp, X_DrawnP = self.posture.grasp, disturbance.X_PDrawn.inverse()
-
-        def sense(part: str) -> RigidTransform:
-            if station.held is not None:
-                return station.pose("left", grasp.jaw) @ grasp.X_PJaw.inverse()
-            return simulation.sense(part) @ X_DrawnP
-
-        return sense
-
     def begin(self, disturbance: Disturbance) -> RobotHand:
         """Put part and jig in their places, the arms at home."""
-        simulation = Simulation(self.cell, disturbance.seed)
+        simulation = Simulation(self.cell)
         X_WJ = disturbance.displaced(self.cell.X_WJ)
         self.cell.jig_base.reset(simulation.root, X_WJ)
-        station = Station(self.cell, simulation.context, simulation.sense, seed=disturbance.seed)
-        station.sense = self._sensor(simulation, station, disturbance)
+        truth = TruthSource.of(self.cell, simulation.root, disturbance.seed)
+        source = DrawnSource(truth, disturbance.X_PDrawn.inverse(), self.posture.grasp)
+        station = Station(self.cell, simulation.root, source, seed=disturbance.seed)
+        source.station = station
         return RobotHand(self, simulation, station, Observer(self.stage, simulation.root))
 
 
@@ -97,11 +135,11 @@ def _stage(cell: Cell, part: str) -> Stage:
         plant=cell.plant,
         scene_graph=cell.scene_graph,
         jig_base=cell.jig_base,
-        soft_jig=cell.soft_jig,
+        soft_jig=cell.fixture,
         part=cell.parts[part],
         samples=SurfaceSamples.of(part, cell.product.parts[part].mesh),
-        gripper=cell.gripper,
-        wrist=cell.wrists["left"],
+        gripper=cell.holder.tool,
+        wrist=cell.holder.wrist,
         force_plate=cell.force_plate,
     )
 
@@ -131,18 +169,17 @@ class RobotHand:
         """Fetch the part, press it into the bag and freeze it there."""
         self.wait("pick: ready", READY_TIME)
         self.observer.tare()
-        self._place(last="jam")
-        X_JP = self.observer.X_JP
-        self.planned = min(map(self._planned, YAWS), key=lambda X: angle_between(X, X_JP))
+        self._place(last=PlacePhase.FIX)
+        self.planned = self._planned(self.station.placements[self._name].yaw)
 
     def let_go(self) -> None:
         """Open the jaws and back off along the approach direction."""
-        self._place(last="retreat")
+        self._place(last=HandPhase.RETREAT)
         self.station.fixed = (self._name,)
 
     def approach(self, line: PushLine) -> None:
         """Come from above and behind, by a planned way."""
-        self._run(Phase("approach", after(0.0), 1.0, start=(rest_jig,)))
+        self._run(Phase(TrialPhase.APPROACH, after(0.0), 1.0, start=(rest_jig,)))
         for phase in _Pending(approach(self.station, self._name, line)):
             self._run(phase)
 
@@ -154,20 +191,20 @@ class RobotHand:
     def wait(self, phase: str, seconds: float) -> None:
         """Hold still."""
         awake = frozenset(self.station.fixed)
-        self._run(Phase(phase, after(seconds), seconds + 1.0, start=(wake_jig,), awake=awake))
+        kind, limit = TrialPhase(phase), seconds + 1.0
+        self._run(Phase(kind, after(seconds), limit, start=(wake_jig,), awake=awake))
 
-    def _place(self, last: str) -> None:
-        """Go on with placing the part, until a phase has ended."""
+    def _place(self, last: Enum) -> None:
+        """Go on with placing the part, until a phase has ended; recorded from the press on."""
         for phase in self._placing:
-            name = phase.name.removeprefix(f"{self._name}: ")
-            self.observer.recording |= name == ON_JIG
+            self.observer.recording |= phase.kind is PlacePhase.PRESS
             if self.observer.recording:
                 awake, start = frozenset([self._name]), (wake_jig, *phase.start)
-                phase = replace(phase, name=name, start=start, awake=awake)
+                outcome = self._run(replace(phase, subject="", start=start, awake=awake))
             else:
-                phase = replace(phase, name=f"pick: {name}", start=(*phase.start, rest_jig))
-            self._placing.outcome = self._run(phase)
-            if name == last:
+                outcome = self._run(replace(phase, subject="pick", start=(*phase.start, rest_jig)))
+            self._placing.outcome = outcome
+            if phase.kind is last:
                 return
 
     def _run(self, phase: Phase) -> Outcome:
@@ -184,7 +221,7 @@ class RobotHand:
     def _planned(self, yaw: float) -> RigidTransform:
         """Return X_JP over the jig, turned by a yaw."""
         cell, posture = self._bench.cell, self._bench.posture
-        height = cell.config.jig.bag.cap_height + HOVER
+        height = cell.fixture.entry_height + HOVER
         part = cell.product.parts[posture.part]
         return planned_pose(part, posture, RigidTransform(), height, yaw)
 
@@ -214,5 +251,5 @@ class _Pending:
         """Return the next phase; a motion that cannot be found is a verdict on the trial."""
         try:
             return self._phases.send(self.outcome)
-        except CellError as error:
+        except RunFailure as error:
             raise PhaseFailed("plan", str(error)) from error

@@ -16,9 +16,9 @@ from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import Posture, Push
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer
-from planning.operations.pick_place import SETTLE_TIME
+from planning.operations.pick_place.phases import SETTLE_TIME
 from planning.operations.placement import upright
-from planning.operations.push import PushLine
+from planning.operations.push.phases import PushLine
 
 HOVER = 0.001  # The part starts this far above the bag, or would, where depth is counted [m] [A].
 REST_TIME = 0.3  # After the hand has left, before it comes to push [s] [A].
@@ -218,7 +218,7 @@ def _place(hand: Hand, trial: Trial, settle: float) -> None:
 def _push(hand: Hand, push: Push, trial: Trial, watch: Watch) -> None:
     """Bring the closed hand beside the part, push, and let everything coast."""
     seen = hand.observer
-    line = push_line(seen.stage, push, seen.X_WJ, seen.X_WP)
+    line = push_line(seen.stage, seen.root, push, seen.X_WJ, seen.X_WP)
     hand.approach(line)
     hand.wait("ready", READY_TIME)
     seen.tare_hand()  # In free air: when the trial began, a jaw may have touched the part.

@@ -6,9 +6,10 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.ndimage import uniform_filter1d
 
-from experiments.metrics.common import Measured, angle_between
 from experiments.paper.camera import seen_displacement
 from experiments.paper.trial import HOVER, Trial
+from planning.operations.measures import angle_between
+from planning.operations.record import Measured
 
 SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
 UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], read as this tilt [A].

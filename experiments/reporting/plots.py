@@ -1,51 +1,29 @@
-"""Plots for the report, each from plain arrays to a PNG."""
+"""Plots for the report, each from plain values to a PNG."""
 
 from __future__ import annotations
 
 import io
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from planning.operations.plot import Plot
+
 SIZE = (8.0, 3.6)  # [inch]
 DPI = 110
 
 
-def plot_insertion_force(depth: np.ndarray, force: np.ndarray, limit: float | None = None) -> bytes:
-    """Plot the force of an insertion over its depth.
-
-    Args:
-        depth: (n,) how far the part is in [m].
-        force: (n, 3) force on the part in W [N].
-        limit: The downward force at which the arm yields [N].
-    """
-    figure, axes = _axes("depth [mm]", "force [N]")
-    lateral = np.hypot(force[:, 0], force[:, 1])
-    axes.plot(1e3 * depth, np.abs(force[:, 2]), label="axial")
-    axes.plot(1e3 * depth, lateral, label="lateral")
-    if limit is not None:
-        axes.axhline(limit, color="0.5", linestyle="--", label="limit")
-    return _png(figure, axes)
-
-
-def plot_torque(
-    angle: Mapping[str, np.ndarray], torque: Mapping[str, np.ndarray], target: float | None = None
-) -> bytes:
-    """Plot the tightening torque over the angle, one curve per bolt.
-
-    Args:
-        angle: Bolt name -> (n,) angle since the thread caught [rad].
-        torque: Bolt name -> (n,) torque [N m].
-        target: Tightening torque to reach [N m].
-    """
-    figure, axes = _axes("angle [turns]", "torque [N m]")
-    for name, values in angle.items():
-        axes.plot(values / (2 * np.pi), torque[name], label=name)
-    if target is not None:
-        axes.axhline(target, color="0.5", linestyle="--", label="target")
+def draw(plot: Plot) -> bytes:
+    """Draw the curves that an operation offers of a step, as a PNG."""
+    figure, axes = _axes(plot.x_label, plot.y_label)
+    for label, (x, y) in plot.curves.items():
+        axes.plot(x, y, label=label)
+    if plot.level is not None:
+        label, height = plot.level
+        axes.axhline(height, color="0.5", linestyle="--", label=label)
     return _png(figure, axes)
 
 

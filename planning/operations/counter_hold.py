@@ -1,8 +1,9 @@
-"""The left hand beside a tightening: it holds the clamped part, or keeps out of the way."""
+"""The gripper beside a tightening: it holds the clamped part, or keeps out of the way."""
 
 from __future__ import annotations
 
 from collections.abc import Generator, Iterator
+from enum import Enum
 
 from cell.products.product import Grasp
 from cell.simulation.phase import Outcome, Phase, motion_finished
@@ -11,31 +12,40 @@ from planning.operations.grasping import (
     Reach,
     first,
     grip,
-    let_go,
     opened,
     reachable_grasps,
 )
 from planning.operations.station import Station
 
-RETREAT = 0.05
+
+class HoldPhase(Enum):
+    """Coming to an assembled part to hold it, or getting out of the way."""
+
+    APPROACH = "approach to hold"
+    REACH = "reach to hold"
+    PARK = "park"
 
 
 def hold(station: Station, part: str) -> Generator[Phase, Outcome, Grasp]:
-    """Yield the phases with which the left hand grips an assembled part; return the grasp."""
+    """Yield the phases with which the hand grips an assembled part; return the grasp.
+
+    Its belief is fresh. `planning.operations.grasping.let_go` lets go of it.
+    """
+    arm, gripper = station.holder, station.holder.tool
     reach = first(_from_the_side(station, part), part, station)
-    frame = station.arm("left").frame(reach.grasp.jaw)
     yield Phase(
-        f"{part}: approach to hold",
+        HoldPhase.APPROACH,
         motion_finished,
         timeout=20.0,
-        left=station.move("left", reach.q_before, [("left_tool", part)]),
-        jaw=opened(reach.grasp),
+        subject=part,
+        commands={
+            arm.name: station.move(arm, reach.q_before, [(station.hand, part)]),
+            gripper.name: opened(gripper.model, reach.grasp),
+        },
     )
+    line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw, speed=HAND_SPEED)
     yield Phase(
-        f"{part}: reach to hold",
-        motion_finished,
-        timeout=10.0,
-        left=station.line("left", frame, reach.X_WJaw, speed=HAND_SPEED),
+        HoldPhase.REACH, motion_finished, timeout=10.0, subject=part, commands={arm.name: line}
     )
     yield from grip(station, part, reach.grasp, awake=frozenset(station.fixed))
     return reach.grasp
@@ -43,7 +53,7 @@ def hold(station: Station, part: str) -> Generator[Phase, Outcome, Grasp]:
 
 def _from_the_side(station: Station, part: str) -> Iterator[Reach]:
     """Yield grasps that leave the space above the part to the driver."""
-    X_WP = station.sense(part)
+    X_WP = station.pose_of(part)
     grasps = [
         grasp
         for grasp in station.part(part).grasps
@@ -52,14 +62,13 @@ def _from_the_side(station: Station, part: str) -> Iterator[Reach]:
     return reachable_grasps(station, part, X_WP, grasps)
 
 
-def release_hold(
-    station: Station, part: str, grasp: Grasp, awake: frozenset[str]
-) -> Iterator[Phase]:
-    """Yield the phases that let go of a part held by `hold`."""
-    yield from let_go(station, part, grasp, RETREAT, awake)
-
-
 def park(station: Station) -> Iterator[Phase]:
-    """Yield the phase that takes the left arm home, out of the driver's way."""
-    home = station.arm("left").home
-    yield Phase("left arm: park", motion_finished, 20.0, left=station.move("left", home))
+    """Yield the phase that takes the holder home, out of the driver's way."""
+    arm = station.holder
+    yield Phase(
+        HoldPhase.PARK,
+        motion_finished,
+        20.0,
+        subject=f"{arm.name} arm",
+        commands={arm.name: station.move(arm, arm.home)},
+    )

@@ -1,22 +1,23 @@
-"""Grasping with the left hand: where the jaw goes, and the phases that take and let go."""
+"""Grasping with the gripper: where the jaw goes, and the phases that take and let go."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.machines.tools import JAW_SETBACK
+from cell.machines.grippers import GripperModel
 from cell.products.product import Grasp
-from cell.simulation.phase import Jaw, Outcome, Phase, Sensed, after, motion_finished
+from cell.simulation.phase import Guard, Jaw, Outcome, Phase, Sensed, after, motion_finished
 from planning.motion.kinematics import Unreachable
+from planning.operations.look import look
 from planning.operations.station import Station
 
 APPROACH = 0.05  # The jaw comes the last stretch straight along its own z [m] [A].
 CLEARANCE = 0.004  # The jaws open this much wider than the part [m] [A].
-WIDEST = 0.050  # Stroke of the gripper [m] [R].
 HAND_SPEED = 0.08  # Of the hand on straight stretches [m/s] [A].
 RELEASE_TIME = 0.15  # Opening by twice the clearance takes half of it at 0.15 m/s [D].
 CLEAR = 0.012  # The jaws have left the part when they are this far back [m] [A].
@@ -25,14 +26,27 @@ GRIP_TIME = 0.25  # Closing and building up the force [s] [A].
 LOST = 0.0015
 
 
+class HandPhase(Enum):
+    """Taking a part and letting it go, in any operation."""
+
+    APPROACH = "approach"
+    DESCEND = "descend"
+    GRIP = "grip"
+    LIFT = "lift"
+    LOOK_IN_HAND = "look in hand"
+    RELEASE = "release"
+    CLEAR = "clear"
+    RETREAT = "retreat"
+
+
 @dataclass(frozen=True)
 class Reach:
     """A grasp that the arm can carry out.
 
     Attributes:
         grasp: Which one.
-        q_before: Joint angles (6,) with the jaw `APPROACH` away.
-        q_at: Joint angles (6,) at the grasp.
+        q_before: Joint angles (n,) with the jaw `APPROACH` away [rad].
+        q_at: Joint angles (n,) at the grasp [rad].
         X_WJaw: Pose of the jaw at the grasp.
     """
 
@@ -47,58 +61,84 @@ def backed_off(X_WJaw: RigidTransform, distance: float) -> RigidTransform:
     return X_WJaw @ RigidTransform([0.0, 0.0, -distance])
 
 
-def tip_opening(grasp: Grasp) -> float:
+def raised(X_WP: RigidTransform, height: float) -> RigidTransform:
+    """Return the pose moved up along +z of W."""
+    return RigidTransform(X_WP.rotation(), X_WP.translation() + [0.0, 0.0, height])
+
+
+def comes_from_above(X_WP: RigidTransform, X_PJaw: RigidTransform) -> bool:
+    """Return whether the hand points down at the part: it must not meet what the part comes to."""
+    return bool((X_WP @ X_PJaw).rotation().matrix()[2, 2] < -0.9)
+
+
+def tip_opening(gripper: GripperModel, grasp: Grasp) -> float:
     """Return the opening of the tip pads at which the grasp's jaws touch the part [m]."""
-    return grasp.width - JAW_SETBACK[grasp.jaw]
+    return grasp.width - gripper.setback[grasp.jaw]
 
 
-def opened(grasp: Grasp) -> Jaw:
+def opened(gripper: GripperModel, grasp: Grasp) -> Jaw:
     """Return the command that opens the jaws around the part."""
-    return Jaw(min(tip_opening(grasp) + CLEARANCE, WIDEST))
+    return Jaw(min(tip_opening(gripper, grasp) + CLEARANCE, gripper.stroke))
 
 
 def reachable_grasps(
     station: Station, part: str, X_WP: RigidTransform, grasps: Sequence[Grasp]
 ) -> Iterator[Reach]:
-    """Yield the grasps of a part at a pose that the left arm reaches without collision.
+    """Yield the grasps of a part at a pose that the holder reaches without collision.
 
     The hand may come close to the part itself; everything else is kept clear of.
     """
-    arm = station.arm("left")
+    arm, hand = station.holder, station.hand
     near = arm.positions(station.context)
-    may_touch = [("left_tool", part), ("left_tool", "held")]
+    may_touch = [(hand, part), (hand, "held")]
     for grasp in grasps:
         X_WJaw = X_WP @ grasp.X_PJaw
         frame = arm.frame(grasp.jaw)
-        before = station.configurations(
-            "left", frame, backed_off(X_WJaw, APPROACH), near, may_touch
-        )
+        before = station.configurations(arm, frame, backed_off(X_WJaw, APPROACH), near, may_touch)
         for q_before in before:
-            at = station.configurations("left", frame, X_WJaw, q_before, [("left_tool", "*")])
+            at = station.configurations(arm, frame, X_WJaw, q_before, [(hand, "*")])
             if at and np.max(np.abs(at[0] - q_before)) < 1.0:
                 yield Reach(grasp, q_before, at[0], X_WJaw)
 
 
-def lost_grasp(held_opening: float) -> Callable[[Sensed], str | None]:
-    """Return a guard: the jaws have closed further than when they gripped."""
+def first(reaches: Iterator[Reach], part: str, station: Station) -> Reach:
+    """Return the first reachable grasp.
+
+    Raises:
+        Unreachable: There is none.
+    """
+    for reach in reaches:
+        return reach
+    raise no_grasp(station, part)
+
+
+def no_grasp(station: Station, part: str) -> Unreachable:
+    """Return the error that says that the gripper cannot take a part where it is."""
+    reason = f"no grasp of part '{part}' is reachable there"
+    return Unreachable(station.holder.name, "jaw", station.pose_of(part), reason)
+
+
+def lost_grasp(station: Station, held_opening: float | None = None) -> Guard:
+    """Return a guard: the jaws have closed further than when they gripped.
+
+    Args:
+        station: The planner's view of the cell.
+        held_opening: Opening of the tip pads when they gripped [m]; None: as it is remembered now.
+    """
+    gripper = station.holder.tool.name
+    least = (station.held_opening if held_opening is None else held_opening) - LOST
 
     def guard(sensed: Sensed) -> str | None:
-        if sensed.jaw_opening < held_opening - LOST:
-            return f"lost grasp: jaws at {1e3 * sensed.jaw_opening:.2f} mm"
-        return None
+        opening = sensed.grippers[gripper].opening
+        return f"lost grasp: jaws at {1e3 * opening:.2f} mm" if opening < least else None
 
     return guard
-
-
-def gripped(sensed: Sensed) -> bool:
-    """End condition: the jaws have come to rest."""
-    return sensed.time >= GRIP_TIME and abs(sensed.jaw_rate) < 1e-3
 
 
 def take(
     station: Station, part: str, reach: Reach, height: float, riders: tuple[str, ...] = ()
 ) -> Iterator[Phase]:
-    """Yield the phases that fetch a part: approach, descend, grip, lift.
+    """Yield the phases that fetch a part and look at it in the hand.
 
     Args:
         station: The planner's view of the cell.
@@ -115,54 +155,69 @@ def seize(
     station: Station, part: str, reach: Reach, riders: tuple[str, ...] = ()
 ) -> Iterator[Phase]:
     """Yield the phases after which a part is in the hand, where it stands."""
-    frame = station.arm("left").frame(reach.grasp.jaw)
+    arm, gripper = station.holder, station.holder.tool
     yield Phase(
-        f"{part}: approach",
+        HandPhase.APPROACH,
         motion_finished,
         timeout=20.0,
-        left=station.move("left", reach.q_before, [("left_tool", part)]),
-        jaw=opened(reach.grasp),
+        subject=part,
+        commands={
+            arm.name: station.move(arm, reach.q_before, [(station.hand, part)]),
+            gripper.name: opened(gripper.model, reach.grasp),
+        },
     )
+    line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw, speed=HAND_SPEED)
     yield Phase(
-        f"{part}: descend",
-        motion_finished,
-        timeout=10.0,
-        left=station.line("left", frame, reach.X_WJaw, speed=HAND_SPEED),
+        HandPhase.DESCEND, motion_finished, timeout=10.0, subject=part, commands={arm.name: line}
     )
     yield from grip(station, part, reach.grasp)
-    station.held, station.riders = part, riders
-
-
-def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[Phase]:
-    """Yield the phase that takes the part in the hand straight up by a height [m]."""
-    X_WJaw, frame = (
-        station.pose("left", reach.grasp.jaw),
-        station.arm("left").frame(reach.grasp.jaw),
-    )
-    up = RigidTransform(X_WJaw.rotation(), X_WJaw.translation() + [0.0, 0.0, height])
-    yield Phase(
-        f"{part}: lift",
-        motion_finished,
-        timeout=10.0,
-        left=station.line("left", frame, up, speed=HAND_SPEED),
-        guard=lost_grasp(station.held_opening),
-        awake=frozenset([part, *station.riders]),
-    )
+    station.carry(part, riders)
 
 
 def grip(
     station: Station, part: str, grasp: Grasp, awake: frozenset[str] = frozenset()
 ) -> Generator[Phase, Outcome, None]:
     """Yield the phase that closes the jaws; fails if they find nothing in between."""
+    gripper = station.holder.tool
+    opening = tip_opening(gripper.model, grasp)
+
+    def at_rest(sensed: Sensed) -> bool:
+        return sensed.time >= GRIP_TIME and abs(sensed.grippers[gripper.name].rate) < 1e-3
+
     outcome: Outcome = yield Phase(
-        f"{part}: grip",
-        gripped,
+        HandPhase.GRIP,
+        at_rest,
         timeout=2.0,
-        jaw=Jaw(tip_opening(grasp), grasp.force),
-        guard=lost_grasp(tip_opening(grasp)),
+        subject=part,
+        commands={gripper.name: Jaw(opening, grasp.force)},
+        guard=lost_grasp(station, opening),
         awake=awake | {part},
     )
-    station.held_opening = outcome.sensed.jaw_opening
+    station.held_opening = outcome.sensed.grippers[gripper.name].opening
+
+
+def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[Phase]:
+    """Yield the phases that take the part in the hand straight up by a height [m].
+
+    The pose in the hand is looked at, not assumed: the part may have slipped in the grip.
+    """
+    arm, awake = station.holder, frozenset(station.in_hand)
+    up = raised(station.tool_pose(arm, reach.grasp.jaw), height)
+    guard = lost_grasp(station)
+    yield Phase(
+        HandPhase.LIFT,
+        motion_finished,
+        timeout=10.0,
+        subject=part,
+        commands={
+            arm.name: station.line(arm, arm.frame(reach.grasp.jaw), up, speed=HAND_SPEED),
+        },
+        guard=guard,
+        awake=awake,
+    )
+    yield from look(
+        station, HandPhase.LOOK_IN_HAND, part, station.in_hand, awake=awake, guard=guard
+    )
 
 
 def let_go(
@@ -170,32 +225,39 @@ def let_go(
 ) -> Iterator[Phase]:
     """Yield the phases that open the jaws and back the hand off straight.
 
-    The part stays awake until the jaws are clear of it.
+    Args:
+        station: The planner's view of the cell.
+        part: Name of the part in the hand, or in its grip.
+        grasp: How it is held.
+        retreat: How far the hand backs off [m].
+        awake: Names of the parts that are awake until the jaws are clear.
     """
+    arm, gripper = station.holder, station.holder.tool
     yield Phase(
-        f"{part}: release", after(RELEASE_TIME), timeout=1.0, jaw=opened(grasp), awake=awake
+        HandPhase.RELEASE,
+        after(RELEASE_TIME),
+        timeout=1.0,
+        subject=part,
+        commands={gripper.name: opened(gripper.model, grasp)},
+        awake=awake,
     )
-    station.held, station.riders = None, ()
-    X_WJaw, frame = station.pose("left", grasp.jaw), station.arm("left").frame(grasp.jaw)
-    for name, distance, stay in (("clear", CLEAR, awake), ("retreat", retreat, frozenset())):
-        goal = backed_off(X_WJaw, distance)
+    station.put_down()
+    X_WJaw, frame = station.tool_pose(arm, grasp.jaw), arm.frame(grasp.jaw)
+    for kind, distance, stay in (
+        (HandPhase.CLEAR, CLEAR, awake),
+        (HandPhase.RETREAT, retreat, frozenset[str]()),
+    ):
+        line = station.line(arm, frame, backed_off(X_WJaw, distance), speed=HAND_SPEED)
         yield Phase(
-            f"{part}: {name}",
+            kind,
             motion_finished,
             timeout=10.0,
-            left=station.line("left", frame, goal, speed=HAND_SPEED),
+            subject=part,
+            commands={arm.name: line},
             awake=stay,
         )
 
 
-def first(reaches: Iterator[Reach], part: str, station: Station) -> Reach:
-    """Return the first reachable grasp."""
-    for reach in reaches:
-        return reach
-    raise no_grasp(station, part)
-
-
-def no_grasp(station: Station, part: str) -> Unreachable:
-    """Return the error that says that the left hand cannot take a part where it is."""
-    reason = f"no grasp of part '{part}' is reachable there"
-    return Unreachable("left", "jaw", station.sense(part), reason)
+def jaw_to_part(station: Station, part: str, grasp: Grasp) -> RigidTransform:
+    """Return X_JawP, how a part is believed to lie in the jaw."""
+    return station.tool_pose(station.holder, grasp.jaw).inverse() @ station.pose_of(part)

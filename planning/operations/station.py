@@ -1,65 +1,79 @@
-"""What operations plan with: sensed poses in, collision-free timed motions of the arms out."""
+"""What operations plan with: believed poses in, collision-free timed motions of the arms out."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pydrake.geometry import Convex, SceneGraph
+from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame, SpatialInertia
 from pydrake.systems.framework import Context
 
-from cell.builder import Cell, add_arms, add_workcell
+from cell.builder import Cell
 from cell.configuration.config import CellConfig
 from cell.machines.arm import Arm
-from cell.products.product import Part, Product
+from cell.machines.devices import add_arms, make_drives
+from cell.machines.workcell import add_workcell
+from cell.products.product import Part
 from cell.workpieces.parts import add_parts
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
 from planning.motion.kinematics import Unreachable, ik_solutions, tool_pose
 from planning.motion.paths import plan_line, plan_path
 from planning.motion.timing import JointMotion, time_path
+from planning.perception.belief import Belief, Source, State
 
 FINE_CLEARANCE = 5e-4  # Kept next to neighbours of a hole; smaller than any gap there [m] [A].
-SINGULAR_SINE = 0.2  # Of wrist 2 and of the elbow [A].
-WOUND_UP = np.deg2rad(310.0)  # Joints turn by 360 degrees either way [A].
+FIXTURE = "jig_base"  # The model instance that carries the fixture.
+SAVED = "station/"  # Before the names in a saved state.
 
 
-def collision_model(config: CellConfig, product: Product) -> CollisionModel:
-    """Return the planning copy of a cell, with the inflated bag as an obstacle."""
+def collision_model(cell: Cell, config: CellConfig) -> CollisionModel:
+    """Return the planning copy of a cell, with the empty fixture as an obstacle.
+
+    Args:
+        cell: The cell.
+        config: What the planner believes it to be.
+    """
 
     def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
-        _, jig_base = add_workcell(plant, config, product)
+        workcell = add_workcell(plant, config, cell.product.tray)
         plant.RegisterCollisionGeometry(
-            jig_base, RigidTransform(), _cap(config), "bag", CoulombFriction(1.0, 1.0)
+            workcell.base,
+            RigidTransform(),
+            cell.fixture.obstacle(),
+            "fixture",
+            CoulombFriction(1.0, 1.0),
         )
-        left, right = add_arms(plant, config)
-        add_parts(plant, scene_graph, product, config.workcell.X_WT)
-        return {"left": left, "right": right}
+        arms = add_arms(plant, config, make_drives(config))
+        add_parts(plant, cell.product, config.workcell.X_WT)
+        return arms
 
     motion = config.motion
     return CollisionModel(
         populate,
         arm_clearance=motion.arm_clearance,
         obstacle_clearance=motion.obstacle_clearance,
-        hand=("left", "tip"),
+        hand=(cell.holder.name, "tip"),
     )
 
 
-def _cap(config: CellConfig) -> Convex:
-    """Return the convex hull of the inflated bag, in J."""
-    bag = config.jig.bag
-    angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False)
-    rings = []
-    for height in np.linspace(0.0, bag.cap_height, 5):
-        below_centre = bag.cap_radius - bag.cap_height + height
-        radius = np.sqrt(max(bag.cap_radius**2 - below_centre**2, 0.0))
-        ring = [radius * np.cos(angles), radius * np.sin(angles), np.full(16, height)]
-        rings.append(np.array(ring))
-    return Convex(points=np.hstack(rings), label="bag")
+@dataclass(frozen=True)
+class Placement:
+    """Where on the fixture a part is meant to go: a pose that suits all arms.
+
+    Attributes:
+        yaw: About the vertical [rad].
+        X_WP: Pose of the part while it hovers over the fixture.
+        q: Joint angles (n,) of the holder there [rad].
+    """
+
+    yaw: float
+    X_WP: RigidTransform
+    q: np.ndarray
 
 
 @dataclass
@@ -68,118 +82,176 @@ class Station:
 
     Attributes:
         cell: The cell.
-        context: Plant context, only read: joint angles of arms and tools.
-        sense: Returns the sensed pose X_WP of a part.
+        root: Context of the diagram, only read.
+        source: How it sees where parts are.
         seed: Seeds every sampling planner, together with the number of the call.
         nominal: What the planner believes the cell to be; None: exactly as it was built.
+        context: Context of the plant, only read: joint angles of arms and tools.
+        belief: Where the parts are, as far as it knows.
         model: The planning copy.
-        held: Name of the part in the left hand; None when it is empty.
+        held: Name of the part in the hand; None when it is empty.
         riders: Names of the parts that lie loose on the one in the hand.
-        fixed: Names of the parts that the jig holds, with what has been mated to them.
-        origins: By name of a part, the sensed pose X_WP from which it was taken to the jig.
+        fixed: Names of the parts that the fixture holds, with what has been mated to them.
+        driven: Names of the bolts that the driver has run into their threads.
+        origins: By name of a part, the pose X_WP from which it was taken to the fixture.
+        placements: By name of a part, where on the fixture it was meant to go.
         held_opening: Opening of the tip pads when it was gripped [m].
     """
 
     cell: Cell
-    context: Context
-    sense: Callable[[str], RigidTransform]
+    root: Context
+    source: Source
     seed: int
     nominal: CellConfig | None = None
+    context: Context = field(init=False)
+    belief: Belief = field(init=False)
     model: CollisionModel = field(init=False)
     held: str | None = None
     riders: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
+    driven: tuple[str, ...] = ()
     origins: dict[str, RigidTransform] = field(default_factory=dict)
+    placements: dict[str, Placement] = field(default_factory=dict)
     held_opening: float = 0.0
     _calls: int = 0
 
     def __post_init__(self) -> None:
-        self.model = collision_model(self.config, self.cell.product)
+        self.context = self.cell.plant.GetMyContextFromRoot(self.root)
+        self.belief = Belief(self.source, hand=lambda: self.tool_pose(self.holder, "tip"))
+        self.model = collision_model(self.cell, self.config)
 
     @property
     def config(self) -> CellConfig:
         """Configuration of the cell, as far as the planner knows."""
         return self.cell.config if self.nominal is None else self.nominal
 
+    @property
+    def holder(self) -> Arm:
+        """The arm that carries the gripper."""
+        return self.cell.holder
+
+    @property
+    def driver(self) -> Arm:
+        """The arm that carries the screwdriver."""
+        return self.cell.driver
+
+    @property
+    def hand(self) -> str:
+        """Name of the gripper's model, for pairs that may touch."""
+        return f"{self.holder.name}_tool"
+
     def part(self, name: str) -> Part:
         """Return a part's description."""
         return self.cell.product.parts[name]
 
-    def arm(self, name: str) -> Arm:
-        """Return an arm."""
-        return self.cell.arms[name]
+    # What is known of the parts.
 
     @property
     def in_hand(self) -> tuple[str, ...]:
-        """Names of the part in the left hand and of what rides on it."""
+        """Names of the part in the hand and of what rides on it."""
         return () if self.held is None else (self.held, *self.riders)
 
-    def pose(self, arm: str, frame: str) -> RigidTransform:
-        """Return the pose of a tool frame as it is now."""
-        return self.arm(arm).frame(frame).CalcPoseInWorld(self.context)
+    def look(self, *parts: str) -> None:
+        """Refresh the belief about some parts, or about all; everything must stand still."""
+        self.belief.look(parts or [part.part.name for part in self.cell.parts])
+
+    def pose_of(self, part: str) -> RigidTransform:
+        """Return the believed pose X_WP of a part."""
+        return self.belief.pose(part)
+
+    def carry(self, part: str, riders: tuple[str, ...] = ()) -> None:
+        """Take note that the hand holds a part, with others riding on it."""
+        self.held, self.riders = part, riders
+        self.belief.carry(self.in_hand)
+
+    def put_down(self) -> None:
+        """Take note that the hand has let go."""
+        self.held, self.riders = None, ()
+        self.belief.put_down()
+
+    # Motions.
+
+    def tool_pose(self, arm: Arm, frame: str) -> RigidTransform:
+        """Return the pose of a frame of an arm's tool as it is now."""
+        return arm.frame(frame).CalcPoseInWorld(self.context)
 
     def surroundings(
         self, may_touch: Iterable[tuple[str, str]] = (), clearance: float | None = None
     ) -> Surroundings:
-        """Return everything as it is sensed now."""
-        plant, cell = self.cell.plant, self.cell
-        names = [part.part.name for part in cell.parts]
-        X_HandW = self.pose("left", "tip").inverse()
+        """Return everything as it is believed to be now, without parts that were never seen."""
+        X_HandW = self.tool_pose(self.holder, "tip").inverse()
+        others = [name for name in self.belief.estimates if name not in self.in_hand]
         return Surroundings(
-            arms={arm.name: arm.positions(self.context) for arm in cell.arms.values()},
-            tools={"left_tool": plant.GetPositions(self.context, cell.left.tool)},
-            X_WP={name: self.sense(name) for name in names if name not in self.in_hand},
-            X_HandP={name: X_HandW @ self.sense(name) for name in self.in_hand},
+            arms={arm.name: arm.positions(self.context) for arm in self.cell.arms.values()},
+            tools={
+                self.hand: self.cell.plant.GetPositions(self.context, self.holder.tool_instance)
+            },
+            X_WP={name: self.pose_of(name) for name in others},
+            X_HandP={name: X_HandW @ self.pose_of(name) for name in self.in_hand},
             may_touch=tuple(may_touch),
             obstacle_clearance=clearance,
         )
 
     def configurations(
         self,
-        arm: str,
+        arm: Arm,
         frame: Frame,
         X_WF: RigidTransform,
         near: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
     ) -> list[np.ndarray]:
-        """Return the collision-free joint angles that put a tool frame at a pose, nearest first."""
+        """Return the collision-free joint angles (n,) [rad] with a tool frame at a pose.
+
+        Args:
+            arm: The arm.
+            frame: Of its tool.
+            X_WF: Where the frame shall be.
+            near: (n,) joint angles; the nearest solution comes first.
+            may_touch: Pairs that are not checked, see `Surroundings`.
+            clearance: Least distance to what is not a robot [m]; None: the configured one.
+        """
         self.model.arrange(self.surroundings(may_touch, clearance))
-        solutions = ik_solutions(self.arm(arm), self.context, frame, X_WF, near)
-        return [q for q in solutions if is_regular(q) and self.model.is_free(arm, q)]
+        solutions = ik_solutions(arm, self.context, frame, X_WF, near)
+        return [q for q in solutions if arm.model.is_regular(q) and self.model.is_free(arm.name, q)]
 
     def configuration(
         self,
-        arm: str,
+        arm: Arm,
         frame: Frame,
         X_WF: RigidTransform,
         near: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
     ) -> np.ndarray:
-        """Return the nearest of the `configurations` (6,).
+        """Return the nearest of the `configurations` (n,) [rad].
 
         Raises:
             Unreachable: There is none.
         """
         for q in self.configurations(arm, frame, X_WF, near, may_touch, clearance):
             return q
-        raise Unreachable(arm, frame.name(), X_WF, "out of reach, or every way there collides")
+        reason = "out of reach, or every way there collides"
+        raise Unreachable(arm.name, frame.name(), X_WF, reason)
 
     def move(
         self,
-        arm: str,
+        arm: Arm,
         q_goal: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
     ) -> JointMotion:
-        """Return a collision-free motion from where the arm is to ``q_goal`` (6,)."""
+        """Return a collision-free motion from where the arm is to ``q_goal`` (n,) [rad].
+
+        Raises:
+            NoPath: None was found.
+        """
         self.model.arrange(self.surroundings(may_touch, clearance))
         self._calls += 1
         path = plan_path(
             self.model,
-            arm,
-            self.arm(arm).positions(self.context),
+            arm.name,
+            arm.positions(self.context),
             q_goal,
             seed=self.seed * 1009 + self._calls,
             max_iterations=self.config.motion.max_iterations,
@@ -188,7 +260,7 @@ class Station:
 
     def line(
         self,
-        arm: str,
+        arm: Arm,
         frame: Frame,
         X_WGoal: RigidTransform,
         *,
@@ -197,57 +269,90 @@ class Station:
     ) -> JointMotion:
         """Return the motion that takes a tool frame straight to a pose.
 
-        Only the arms are kept apart on it: it is meant for the last stretch before a contact.
+        Collisions are not checked on it: it is meant for the last stretch before a contact.
 
         Args:
-            arm: Name of the arm.
+            arm: The arm.
             frame: Of its tool.
             X_WGoal: Where the frame goes.
             speed: Largest mean speed of the frame's origin [m/s].
-            q_start: (6,) where it begins; None: where the arm is.
-        """
-        arm_ = self.arm(arm)
-        q_start = arm_.positions(self.context) if q_start is None else q_start
-        self.model.arrange(self.surroundings([(f"{arm}_tool", "*"), ("held", "*")]))
-        path = plan_line(arm_, self.context, frame, q_start, X_WGoal)
-        start = tool_pose(arm_, self.context, frame, q_start)
-        distance = float(np.linalg.norm(X_WGoal.translation() - start.translation()))
-        return slowed(self._timed(arm, path), distance / speed)
+            q_start: (n,) where it begins [rad]; None: where the arm is.
 
-    def _timed(self, arm: str, path: JointPath) -> JointMotion:
+        Raises:
+            Unreachable: A point of the line is out of reach.
+            NoPath: The joints would have to jump.
+        """
+        q_start = arm.positions(self.context) if q_start is None else q_start
+        path = plan_line(arm, self.context, frame, q_start, X_WGoal)
+        start = tool_pose(arm, self.context, frame, q_start)
+        distance = float(np.linalg.norm(X_WGoal.translation() - start.translation()))
+        motion = self._timed(arm, path)
+        slower = distance / speed / motion.duration if motion.duration > 0 else 1.0
+        if slower <= 1.0:
+            return motion
+        return replace(motion, time=motion.time * slower, v=motion.v / slower)
+
+    def _timed(self, arm: Arm, path: JointPath) -> JointMotion:
         motion = self.config.motion
         return time_path(
-            self.arm(arm),
+            arm,
             self.context,
             path,
             velocity_scale=motion.velocity_scale,
             acceleration_limit=motion.acceleration_limit,
-            payload=self._payload() if arm == "left" else None,
+            payload=self._payload() if arm is self.holder else None,
         )
 
     def _payload(self) -> SpatialInertia | None:
-        """Return what hangs on the left hand, about and in its flange frame."""
+        """Return what hangs on the hand, about and in the flange frame; None if it is empty."""
         if self.held is None:
             return None
-        plant = self.cell.plant
-        flange = plant.GetFrameByName("flange", self.cell.left.instance)
-        bodies = [self.cell.parts[name].body.index() for name in self.in_hand]
-        return plant.CalcSpatialInertia(self.context, flange, bodies)
+        arm, payload = self.holder, SpatialInertia.Zero()
+        flange = self.cell.plant.GetFrameByName(arm.model.flange_frame, arm.instance)
+        X_FW = flange.CalcPoseInWorld(self.context).inverse()
+        for name in self.in_hand:
+            X_FP = X_FW @ self.pose_of(name)
+            inertia = self.cell.parts[name].body.default_spatial_inertia()
+            payload += inertia.ReExpress(X_FP.rotation()).Shift(-X_FP.translation())
+        return payload
+
+    # Saving.
+
+    def save(self) -> State:
+        """Return everything that the planner remembers, as named arrays."""
+        state: State = {f"belief/{name}": value for name, value in self.belief.save().items()}
+        state["held"] = np.array(self.held or "", dtype=str)
+        for name in ("riders", "fixed", "driven"):
+            state[name] = np.array(getattr(self, name), dtype=str)
+        state["held_opening"], state["calls"] = np.array(self.held_opening), np.array(self._calls)
+        for name, X_WP in self.origins.items():
+            state[f"origin/{name}"] = X_WP.GetAsMatrix4()
+        for name, placement in self.placements.items():
+            state[f"placement/{name}/yaw"] = np.array(placement.yaw)
+            state[f"placement/{name}/X_WP"] = placement.X_WP.GetAsMatrix4()
+            state[f"placement/{name}/q"] = placement.q
+        return {f"{SAVED}{name}": value for name, value in state.items()}
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Return to what `save` returned; other names in the state are left alone."""
+        own = _below(state, SAVED)
+        self.belief.restore(_below(own, "belief/"))
+        self.held = str(own["held"]) or None
+        for name in ("riders", "fixed", "driven"):
+            setattr(self, name, tuple(str(part) for part in own[name]))
+        self.held_opening, self._calls = float(own["held_opening"]), int(own["calls"])
+        self.origins = {n: RigidTransform(X_WP) for n, X_WP in _below(own, "origin/").items()}
+        placements = _below(own, "placement/")
+        self.placements = {
+            name: Placement(
+                float(placements[f"{name}/yaw"]),
+                RigidTransform(placements[f"{name}/X_WP"]),
+                placements[f"{name}/q"],
+            )
+            for name in (key.removesuffix("/yaw") for key in placements if key.endswith("/yaw"))
+        }
 
 
-def is_regular(q: np.ndarray) -> bool:
-    """Return whether the arm is well away from its singularities and from winding itself up.
-
-    Close to a singularity of wrist or elbow, a straight line of the tool asks for large turns of
-    the joints; close to a joint limit it cannot go on.
-    """
-    singular = min(abs(np.sin(q[4])), abs(np.sin(q[2]))) < SINGULAR_SINE
-    return bool(not singular and np.max(np.abs(q)) < WOUND_UP)
-
-
-def slowed(motion: JointMotion, duration: float) -> JointMotion:
-    """Return the motion stretched to last at least ``duration`` [s]."""
-    factor = duration / motion.duration if motion.duration > 0 else 1.0
-    if factor <= 1.0:
-        return motion
-    return replace(motion, time=motion.time * factor, v=motion.v / factor)
+def _below(state: Mapping[str, np.ndarray], prefix: str) -> State:
+    """Return the entries whose names begin with a prefix, without it."""
+    return {k.removeprefix(prefix): v for k, v in state.items() if k.startswith(prefix)}

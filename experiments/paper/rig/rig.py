@@ -10,39 +10,34 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
-import trimesh
-from pydrake.geometry import (
-    AddCompliantHydroelasticProperties,
-    AddContactMaterial,
-    AddRigidHydroelasticProperties,
-    Convex,
-    Cylinder,
-    GeometryId,
-    ProximityProperties,
-)
 from pydrake.math import RigidTransform, RotationMatrix
-from pydrake.multibody.plant import AddMultibodyPlant, CoulombFriction, MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.multibody.tree import (
     FixedOffsetFrame,
     ModelInstanceIndex,
     PdControllerGains,
     PrismaticJoint,
     RevoluteJoint,
-    RigidBody,
     SpatialInertia,
     WeldJoint,
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cell.builder import JAW_REST, add_workcell, plant_config
+from cell.builder import plant_config
 from cell.configuration.config import CellConfig
-from cell.fixtures.soft_jig import SoftJig, SurfaceSamples
-from cell.machines.arm import Drive
-from cell.machines.jig_base import JigBase
+from cell.fixtures import add_fixture
+from cell.fixtures.soft_jig import SurfaceSamples
+from cell.fixtures.wiring import wire_fixture
+from cell.machines.drive import JointDrive
+from cell.machines.gripper import Gripper, GripperDrive
+from cell.machines.grippers import HAND_E
+from cell.machines.jig_base import JigBase, set_sliding_friction
 from cell.machines.sensors import WrenchSensor
-from cell.machines.tools import connect_gripper, set_gripper_gains
+from cell.machines.workcell import add_workcell
+from cell.monitor import Monitor, StepCounter
 from cell.paths import model_url, new_parser
 from cell.products.product import Product
+from cell.sleep import Sleep
 from cell.workpieces.parts import add_parts
 from experiments.paper.rig.stage import Stage
 
@@ -53,8 +48,6 @@ SLIDE_DRIVE = (4.5e4, 1e3, 200.0)
 TURN_DRIVE = (5e3, 60.0, 30.0)
 LINK_MASS = 2.0  # Of each slide [kg] [A].
 CARRIAGE_JOINTS = ("x", "y", "z", "turn", "tilt")
-
-RIGID_FRICTION = 0.3  # Metal on metal [A].
 
 
 @dataclass(frozen=True)
@@ -99,22 +92,28 @@ class Rig(Stage):
     Attributes:
         diagram: Plain Drake.
         drive: Targets of the carriage: x, y, z [m], turn, tilt [rad].
+        carriage: Its model instance.
         hand_length: From the carriage to T [m].
+        sleeper: Puts part and base to sleep.
+        monitor: Of the diagram.
     """
 
     diagram: Diagram
-    drive: Drive
+    drive: JointDrive
+    carriage: ModelInstanceIndex
     hand_length: float
+    sleeper: Sleep
+    monitor: Monitor
 
     def joints(self, pose: HandPose) -> np.ndarray:
         """Return the carriage's joint positions (5,) for a hand pose."""
         mount = pose.p_WT - pose.R_WT @ np.array([0.0, 0.0, self.hand_length])
         return np.array([*mount, pose.turn, pose.tilt])
 
-    def reset(
+    def set_up(
         self, root: Context, X_WJ: RigidTransform, X_WP: RigidTransform, q: np.ndarray
     ) -> None:
-        """Put a new Context into the initial state: bag inflated, part held by a stand.
+        """Put everything in its place in a new Context, the part held by a stand.
 
         Args:
             root: Context of the diagram.
@@ -122,65 +121,73 @@ class Rig(Stage):
             X_WP: Where the stand holds the part (it keeps the pose until `let_part_go`).
             q: (5,) where the carriage is.
         """
+        self.monitor.initialize(root)
         context = self.plant.GetMyMutableContextFromRoot(root)
-        self.jig_base.reset(root, X_WJ)
+        self.jig_base.set_down(root, X_WJ)
         self.part.joint.SetPose(context, X_WP)
         self.part.joint.Lock(context)
-        self.plant.SetPositions(context, self.drive.instance, q)
+        self.plant.SetPositions(context, self.carriage, q)
         self.drive.set_target(root, q, np.zeros(len(q)))
-        self.part.sleep_filter = None  # A new Context knows of no filter.
-        if self.soft_jig is not None:
-            for body in self.soft_jig.pressing:
-                self.soft_jig.release(body)
-            self.soft_jig.inflate(root)
 
     def let_part_go(self, root: Context) -> None:
         """Take the stand away."""
         self.part.joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
 
 
-def build_push_rig(config: CellConfig, product: Product, part: str, bed: str = "soft") -> Rig:
-    """Build the rig for one part.
+def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
+    """Build the rig for one part, with the fixture that the configuration names.
 
     Args:
         config: Of the cell; the jig's base is free whatever it says.
         product: Where the part is described.
         part: Its name.
-        bed: "soft" for the soft jig, "rigid" for a flat block as high as the inflated bag.
     """
-    config = replace(config, workcell=replace(config.workcell, jig_base_fixed=False))
-    product = replace(product, parts={part: product.parts[part]}, tray=None)
+    config = config.with_changes({"workcell.jig_base_fixed": False})
     builder = DiagramBuilder()
+    counter = builder.AddNamedSystem("steps", StepCounter(config.simulation.time_step))
+    drive = builder.AddNamedSystem("carriage_drive", JointDrive(np.zeros(len(CARRIAGE_JOINTS))))
+    jaws = builder.AddNamedSystem("gripper_drive", GripperDrive(HAND_E))
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
-    plate_weld, base = add_workcell(plant, config, product)
-    jig_base = JigBase.prepare(plant, scene_graph, plate_weld, base, config)
-    parts = add_parts(plant, scene_graph, product, config.workcell.X_WT)
-    soft_jig = None
-    if bed == "soft":
-        soft_jig = SoftJig.add(plant, scene_graph, base, config.jig)
-    else:
-        _add_block(plant, base, config)
-        _add_details(plant, parts[part].body, product.parts[part].mesh)
+    workcell = add_workcell(plant, config, tray=None)
+    for sliding in (workcell.plate, workcell.base):
+        set_sliding_friction(plant, scene_graph, sliding, config.push.base_friction)
+    alone = replace(product, parts={part: product.parts[part]}, joints=())
+    (loose,) = add_parts(plant, alone, config.workcell.X_WT)
+    kind = config.workcell.fixture
+    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig)
+    fixture.add_part(plant, loose.body, loose.part.mesh)
     wrist, hand = _add_carriage(plant)
+    gripper = Gripper.add(plant, hand, "gripper", HAND_E, jaws)
     plant.Finalize()
-    gripper = connect_gripper(builder, plant, hand, JAW_REST)
-    instance = plant.GetModelInstanceByName("carriage")
-    drive = Drive.connect(builder, plant, instance, np.zeros(len(CARRIAGE_JOINTS)))
+    bearers = (workcell.base, workcell.plate)
+    sleeper = wire_fixture(builder, plant, scene_graph, fixture, bearers).sleeper
+    jig_base = JigBase(config, plant, workcell.base, workcell.plate, sleeper)
+    carriage = plant.GetModelInstanceByName("carriage")
+    drive.connect(builder, plant, carriage)
+    jaws.connect(builder, plant, hand)
     X_MountT = plant.GetFrameByName("tip", hand).GetFixedPoseInBodyFrame()
+
+    def reset(root: Context) -> None:
+        jig_base.reset(root)
+        fixture.install(root)
+
     return Rig(
         config=config,
         plant=plant,
         scene_graph=scene_graph,
         diagram=builder.Build(),
         jig_base=jig_base,
-        soft_jig=soft_jig,
-        part=parts[part],
-        samples=SurfaceSamples.of(part, product.parts[part].mesh),
+        fixture=fixture,
+        part=loose,
+        surface=SurfaceSamples.of(part, loose.part.mesh).points,
         drive=drive,
+        carriage=carriage,
         gripper=gripper,
         hand_length=float(X_MountT.translation()[2]),
         wrist=WrenchSensor(plant, wrist),
-        force_plate=WrenchSensor(plant, plate_weld),
+        force_plate=WrenchSensor(plant, workcell.plate_weld),
+        sleeper=sleeper,
+        monitor=Monitor(counter, reset, [fixture]),
     )
 
 
@@ -203,53 +210,10 @@ def _add_carriage(plant: MultibodyPlant) -> tuple[WeldJoint, ModelInstanceIndex]
         stiffness, damping, limit = SLIDE_DRIVE if k < 3 else TURN_DRIVE
         actuator = plant.AddJointActuator(name, joint, limit)
         actuator.set_controller_gains(PdControllerGains(p=stiffness, d=damping))
-    (hand,) = new_parser(plant).AddModelsFromUrl(model_url("hand_e"))
-    set_gripper_gains(plant, hand)
+    (hand,) = new_parser(plant).AddModelsFromUrl(model_url(HAND_E.sdf))
     down = RigidTransform(RotationMatrix.MakeXRotation(np.pi), np.zeros(3))
     flange = plant.AddFrame(FixedOffsetFrame("flange", link.body_frame(), down))
     wrist = plant.WeldFrames(flange, plant.GetFrameByName("mount", hand))
     plant.set_gravity_enabled(instance, False)
     plant.set_gravity_enabled(hand, False)
     return wrist, hand
-
-
-def _add_block(plant: MultibodyPlant, jig_base: RigidBody, config: CellConfig) -> GeometryId:
-    """Put a flat block where the bag would be."""
-    bag = config.jig.bag
-    properties = ProximityProperties()
-    AddCompliantHydroelasticProperties(0.03, 1e9, properties)
-    _add_metal(properties)
-    block = Cylinder(bag.aperture_radius, bag.cap_height)
-    X_JB = RigidTransform([0.0, 0.0, bag.cap_height / 2])
-    plant.RegisterVisualGeometry(jig_base, X_JB, block, "block", np.array([0.6, 0.6, 0.62, 1.0]))
-    return plant.RegisterCollisionGeometry(jig_base, X_JB, block, "block", properties)
-
-
-def _add_details(plant: MultibodyPlant, body: RigidBody, mesh: trimesh.Trimesh) -> None:
-    """Let what the bed-contact pieces leave out, the motor's pins, touch a rigid plate.
-
-    Each connected piece of the mesh below its main face counts, as its convex hull.
-    """
-    for k, piece in enumerate(_protrusions(mesh)):
-        properties = ProximityProperties()
-        AddRigidHydroelasticProperties(0.005, properties)
-        _add_metal(properties)
-        hull = Convex(points=piece.T, label=f"pin_{k}")
-        plant.RegisterCollisionGeometry(body, RigidTransform(), hull, f"pin_{k}", properties)
-
-
-def _protrusions(mesh: trimesh.Trimesh) -> list[np.ndarray]:
-    """Return the points (n, 3) of each piece that stands out below the largest rear face (-z)."""
-    down = mesh.face_normals[:, 2] < -0.99
-    heights = mesh.triangles_center[:, 2]
-    levels, inverse = np.unique(np.round(heights[down], 4), return_inverse=True)
-    area = np.bincount(inverse, weights=mesh.area_faces[down])
-    rear = levels[np.argmax(area)]
-    below = np.flatnonzero(heights < rear - 1e-4)
-    pieces = trimesh.graph.connected_components(mesh.face_adjacency, nodes=below, min_len=2)
-    return [mesh.vertices[np.unique(mesh.faces[piece])] for piece in pieces]
-
-
-def _add_metal(properties: ProximityProperties) -> None:
-    friction = CoulombFriction(RIGID_FRICTION, RIGID_FRICTION)
-    AddContactMaterial(dissipation=10.0, friction=friction, properties=properties)

@@ -11,8 +11,7 @@ from pydrake.math import RigidTransform
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
-from cell.errors import CellError
-from cell.fixtures.soft_jig import JigState, SoftJig
+from cell.errors import RunFailure
 from experiments.paper.rig.rig import HandPose, Rig
 from experiments.paper.rig.stage import Observer
 from planning.operations.stroke import Stroke
@@ -79,13 +78,13 @@ class RigSimulation:
     ) -> None:
         self.rig = rig
         self.simulator = Simulator(rig.diagram)
+        self.simulator.set_monitor(rig.monitor)
         self.root: Context = self.simulator.get_mutable_context()
         self.observer = Observer(rig, self.root)
         self.stepping_cpu = 0.0
         self.steps = 0
         self.pose = pose
-        self._bed_pushes = False
-        rig.reset(self.root, X_WJ, X_WP, rig.joints(pose))
+        rig.set_up(self.root, X_WJ, X_WP, rig.joints(pose))
         self.simulator.Initialize()
 
     @property
@@ -109,35 +108,27 @@ class RigSimulation:
         self.rig.gripper.command(self.root, opening, force)
 
     def press_with_part(self) -> None:
-        """Let the bag go soft and carry the part by its real surface."""
-        jig = self.rig.soft_jig
-        if jig is not None:
-            jig.soften(self.root)
-            jig.press_with(self.rig.part.body, self.rig.samples)
+        """Let the fixture receive the part."""
+        self.rig.fixture.receive(self.root, self.rig.part.body, self.rig.part.part.mesh)
 
-    def evacuate(self) -> None:
-        """Start the pump, unless the configured vacuum is none at all: then the bag stays soft."""
-        jig = self.rig.soft_jig
-        if jig is not None and jig.params.vacuum.pressure > 0:
-            jig.evacuate(self.root)
+    def fix(self) -> None:
+        """Let the fixture begin to hold the part."""
+        self.rig.fixture.fix(self.root)
 
     @property
-    def frozen(self) -> bool:
-        """Whether there is nothing left to freeze."""
-        jig = self.rig.soft_jig
-        if jig is None or jig.params.vacuum.pressure == 0:
-            return True
-        return jig.state is JigState.JAMMED
+    def fixed(self) -> bool:
+        """Whether the fixture holds as firmly as it will."""
+        return self.rig.fixture.fixed(self.root)
 
     def sleep(self) -> None:
         """Let part and jig rest as they are: nothing touches them, so nothing is computed."""
-        self.rig.part.sleep(self.root)
+        self.rig.sleeper.put_to_sleep(self.root, self.rig.part.body)
         self.rig.jig_base.sleep(self.root)
 
     def wake(self) -> None:
         """Let part and jig move again."""
         self.rig.jig_base.wake(self.root)
-        self.rig.part.wake(self.root)
+        self.rig.sleeper.wake(self.root, self.rig.part.body)
 
     def wait(self, seconds: float) -> None:
         """Hold everything."""
@@ -187,21 +178,10 @@ class RigSimulation:
         self.steps += 1
         try:
             self.simulator.AdvanceTo(self.time)
+        except RunFailure as error:
+            # An imprint that the bag cannot hold is a verdict on the trial.
+            raise self.observer.failure(str(error)) from error
         except RuntimeError as error:
             raise self.observer.failure(f"solver failure: {str(error).splitlines()[0]}") from error
-        if self.rig.soft_jig is not None:
-            self._step_bag(self.rig.soft_jig)
         self.observer.step(self.steps, self.time)
         self.stepping_cpu += time.process_time() - start
-
-    def _step_bag(self, jig: SoftJig) -> None:
-        try:
-            jig.step(self.root, self.time_step)
-        except CellError as error:
-            # An imprint that the bag cannot hold is a verdict on the trial, not bad input.
-            raise self.observer.failure(str(error)) from error
-        forces = jig.applied_forces
-        if forces or self._bed_pushes:
-            port = self.rig.plant.get_applied_spatial_force_input_port()
-            port.FixValue(self.observer.context, forces)
-            self._bed_pushes = bool(forces)

@@ -11,10 +11,10 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.systems.framework import Context
 
 from cell.configuration.config import CellConfig
-from cell.fixtures.soft_jig import SoftJig, SurfaceSamples
+from cell.fixtures.base import Fixture
+from cell.machines.gripper import Gripper
 from cell.machines.jig_base import JigBase
 from cell.machines.sensors import WrenchSensor
-from cell.machines.tools import Gripper
 from cell.simulation.log import Log
 from cell.simulation.phase import PhaseFailed
 from cell.workpieces.parts import LoosePart
@@ -32,9 +32,9 @@ class Stage:
         config: What it was built from.
         plant, scene_graph: Plain Drake.
         jig_base: The base, free on the force plate.
-        soft_jig: The bag on it; None where a flat rigid block stands in its place.
+        fixture: On the base.
         part: The part to place.
-        samples: Its surface, as the bag feels it.
+        surface: (n, 3) points of its surface, in its frame [m].
         gripper: The hand's jaws; frame "tip" of its model is T, between the tip pads.
         wrist: Wrench between the hand and what carries it.
         force_plate: Wrench under the force plate.
@@ -44,9 +44,9 @@ class Stage:
     plant: MultibodyPlant
     scene_graph: SceneGraph
     jig_base: JigBase
-    soft_jig: SoftJig | None
+    fixture: Fixture
     part: LoosePart
-    samples: SurfaceSamples
+    surface: np.ndarray
     gripper: Gripper
     wrist: WrenchSensor
     force_plate: WrenchSensor
@@ -127,8 +127,6 @@ class Observer:
         return np.concatenate([sensor.read(self.context) for sensor in sensors])
 
     def _record(self, time: float, wrenches: np.ndarray) -> None:
-        if self.stage.jig_base.asleep:  # Nothing is felt of what sleeps: it weighs what it weighed.
-            wrenches[6:] = self.latest[6:]
         self.latest = wrenches
         X_WJ, X_WP = self.X_WJ, self.X_WP
         p_JP = X_WJ.inverse() @ X_WP.translation()

@@ -1,4 +1,4 @@
-"""True states of a running cell, as plain values that metrics are computed from."""
+"""True states of a running cell, as plain values that verdicts are computed from."""
 
 from __future__ import annotations
 
@@ -41,15 +41,15 @@ class Snapshot:
 
     Attributes:
         time: [s].
-        X_WJ: Pose of the jig.
+        X_WJ: Pose of the fixture.
         X_WP: Pose of each part.
         V_WP: (6,) velocity of each part in W, angular first [rad/s, m/s].
         X_HF: Pose of each bolt F in its thread frame H.
         turns: Of each bolt since its thread caught.
         clamp: Force that each thread carries [N].
-        spindle_torque: [N m].
-        wrenches: At "left" and "right" wrist and at the "force_plate".
-        hand_clearance: Shortest distance from the left tool to the fixed shaft or boss of each fit,
+        spindle_torque: Of the driver [N m].
+        wrenches: By arm name at the wrists, and at the "force_plate".
+        hand_clearance: Shortest distance from the gripper to the fixed shaft or boss of each fit,
             by the name of the part that carries it [m].
     """
 
@@ -65,47 +65,38 @@ class Snapshot:
     hand_clearance: Mapping[str, float]
 
     def X_JP(self, part: str) -> RigidTransform:
-        """Return the pose of a part in the jig frame."""
+        """Return the pose of a part in the fixture's frame J."""
         return self.X_WJ.InvertAndCompose(self.X_WP[part])
 
 
 def take_snapshot(simulation: Simulation) -> Snapshot:
     """Return the true state of a running cell."""
-    cell, context = simulation.cell, simulation.context
-    return Snapshot(
-        time=simulation.time,
-        X_WJ=cell.soft_jig.pose(context),
-        X_WP={part.part.name: part.X_WP(context) for part in cell.parts},
-        V_WP={part.part.name: part.velocity(context) for part in cell.parts},
-        X_HF={name: thread.X_HF(context) for name, thread in cell.threads.items()},
-        turns={name: float(thread.turns(context)) for name, thread in cell.threads.items()},
-        clamp={name: thread.clamp_force(context) for name, thread in cell.threads.items()},
-        spindle_torque=cell.driver.torque(context),
-        wrenches=_wrenches(simulation),
-        hand_clearance=_hand_clearance(simulation),
-    )
-
-
-def _wrenches(simulation: Simulation) -> dict[str, Wrench]:
-    cell, context = simulation.cell, simulation.context
-    sensors = {**cell.wrists, "force_plate": cell.force_plate}
+    cell, root, context = simulation.cell, simulation.root, simulation.context
+    sensors = {name: arm.wrist for name, arm in cell.arms.items()}
     wrenches = {}
-    for name, sensor in sensors.items():
+    for name, sensor in {**sensors, "force_plate": cell.force_plate}.items():
         reading = sensor.read(context)
         p_WS = sensor.weld.frame_on_child().CalcPoseInWorld(context).translation()
         wrenches[name] = Wrench(reading[:3], reading[3:], p_WS)
-    return wrenches
-
-
-def _hand_clearance(simulation: Simulation) -> dict[str, float]:
-    cell = simulation.cell
-    context = cell.scene_graph.GetMyContextFromRoot(simulation.root)
-    query = cell.scene_graph.get_query_output_port().Eval(context)
-    return {fit.shaft: _distance(cell, query, fit.shaft) for fit in cell.product.fits}
+    query = cell.scene_graph.get_query_output_port().Eval(
+        cell.scene_graph.GetMyContextFromRoot(root)
+    )
+    return Snapshot(
+        time=simulation.time,
+        X_WJ=cell.fixture.pose(context),
+        X_WP={part.part.name: part.X_WP(context) for part in cell.parts},
+        V_WP={part.part.name: part.velocity(context) for part in cell.parts},
+        X_HF={bolt: cell.threads[bolt].X_HF(context) for bolt in cell.threads},
+        turns={bolt: float(cell.threads.turns(root, bolt)) for bolt in cell.threads},
+        clamp={bolt: cell.threads[bolt].clamp_force(context) for bolt in cell.threads},
+        spindle_torque=cell.driver.tool.read(context).torque,
+        wrenches=wrenches,
+        hand_clearance={fit.shaft: _distance(cell, query, fit.shaft) for fit in cell.product.fits},
+    )
 
 
 def _distance(cell: Cell, query: QueryObject, part: str) -> float:
-    """Return the shortest distance between the left tool and the shafts of a part [m]."""
+    """Return the shortest distance between the gripper and the shafts of a part [m]."""
     plant, inspector = cell.plant, cell.scene_graph.model_inspector()
     shafts = [
         geometry
@@ -114,7 +105,7 @@ def _distance(cell: Cell, query: QueryObject, part: str) -> float:
     ]
     hand = [
         geometry
-        for body in plant.GetBodyIndices(cell.left.tool)
+        for body in plant.GetBodyIndices(cell.holder.tool_instance)
         for geometry in plant.GetCollisionGeometriesForBody(plant.get_body(body))
     ]
     pairs = [(a, b) for a in hand for b in shafts]

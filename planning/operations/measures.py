@@ -1,21 +1,42 @@
-"""What every operation is judged by: forces under the jig, and whether the part on it moved."""
+"""What every step is measured for: forces under the jig, and whether the part on it moved."""
 
 from __future__ import annotations
 
 import numpy as np
 from pydrake.math import RigidTransform
 
-from experiments.metrics.record import OperationRecord
-from experiments.metrics.snapshot import Snapshot
+from cell.builder import Cell
+from planning.operations.record import Arrays, Measured, StepRecord, rows_between
+from planning.operations.snapshot import Snapshot
 
-Measured = dict[str, float]
+
+def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:
+    """Return what a step is judged by.
+
+    Args:
+        cell: The cell it ran in.
+        record: Of the step.
+        log: All columns so far.
+    """
+    assert record.end is not None
+    if "time" not in log:  # Failed before the first sample.
+        return {}
+    rows = rows_between(log, record.start.time, record.end.time)
+    measured = record.step.operation.measure(cell, record, log)
+    measured |= force_plate_peaks(rows["force_plate"], log["force_plate"][0])
+    return {name: value for name, value in measured.items() if np.isfinite(value)}
+
+
+def named_of(part: str, measured: Measured) -> Measured:
+    """Return quantities of one of several parts, with its name before theirs."""
+    return {f"{part}/{name}": value for name, value in measured.items()}
 
 
 def force_plate_peaks(wrench: np.ndarray, rest: np.ndarray) -> Measured:
     """Return the largest force and torque under the jig.
 
     Args:
-        wrench: (n, 6) torque [N m] and force [N] over an operation.
+        wrench: (n, 6) torque [N m] and force [N] over a step.
         rest: (6,) reading of the empty jig, taken off.
     """
     if not len(wrench):
@@ -40,8 +61,8 @@ def moved(part: str, before: Snapshot, after: Snapshot) -> tuple[float, float]:
     return float(distance), angle_between(X_JP0, X_JP1)
 
 
-def base_moved(record: OperationRecord) -> Measured:
-    """Return how far the part on the jig moved in an operation, and since it was placed."""
+def base_moved(record: StepRecord) -> Measured:
+    """Return how far the part on the jig moved in a step, and since it was placed."""
     if record.end is None or record.base is None or record.placed is None:
         return {}
     now = moved(record.base, record.start, record.end)

@@ -1,19 +1,25 @@
-"""What was recorded of a run, phase by phase, for the metrics."""
+"""What is recorded of a run, phase by phase, for what is measured of it."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from enum import Enum
+from typing import TYPE_CHECKING
 
 import numpy as np
 from pydrake.common.eigen_geometry import Quaternion
 from pydrake.math import RigidTransform
 
 from cell.builder import Cell
-from experiments.metrics.snapshot import Snapshot
-from planning.operations.sequence import Operation
+from planning.operations.snapshot import Snapshot
+from planning.operations.station import Placement
+
+if TYPE_CHECKING:
+    from planning.operations.operation import Step
 
 Arrays = Mapping[str, np.ndarray]
+Measured = dict[str, float]  # Quantity, with its SI unit in the name -> value.
 
 
 @dataclass(frozen=True)
@@ -21,8 +27,8 @@ class PhaseRecord:
     """One phase that came to its end.
 
     Attributes:
-        start, end: The truth before its first and after its last step.
-        peak_force: Largest force at each wrist, less the reading at the start [N].
+        start, end: The truth before its first and after its last time step.
+        peak_force: By arm name, largest force at its wrist, less the reading at the start [N].
         awake: Names of the parts that were: nothing acts on a part that sleeps.
     """
 
@@ -33,29 +39,31 @@ class PhaseRecord:
 
 
 @dataclass
-class OperationRecord:
-    """One operation, up to where it ended, well or not.
+class StepRecord:
+    """One step of an assembly, up to where it ended, well or not.
 
     Attributes:
-        operation: Which one.
+        step: Which one.
         start, end: The truth around it.
-        base: Name of the part that the jig holds; None before one is placed.
-        placed: The truth when it had been placed, or when the run began with it on the jig.
-        origin: X_WP from which the part that is moved was once taken to the jig, if it was.
-        phases: By name; a name occurs once in an operation.
+        base: Name of the part that the fixture holds; None before one is placed.
+        placed: The truth when it had been placed, or when the run began with it on the fixture.
+        origin: X_WP from which the part that is moved was once taken to the fixture, if it was.
+        placement: Where on the fixture the part that is moved was meant to go, if it was.
+        phases: By subject and kind; each occurs once in a step.
     """
 
-    operation: Operation
+    step: Step
     start: Snapshot
     base: str | None = None
     placed: Snapshot | None = None
     origin: RigidTransform | None = None
-    phases: dict[str, PhaseRecord] = field(default_factory=dict)
+    placement: Placement | None = None
+    phases: dict[tuple[str, Enum], PhaseRecord] = field(default_factory=dict)
     end: Snapshot | None = None
 
-    def named(self, part: str, *names: str) -> list[PhaseRecord]:
-        """Return those of the phases "<part>: <name>" that ran, in the order of the names."""
-        keys = [f"{part}: {name}" for name in names]
+    def of(self, subject: str, *kinds: Enum) -> list[PhaseRecord]:
+        """Return those phases of a subject that ran, in the order of the kinds asked for."""
+        keys = [(subject, kind) for kind in kinds]
         return [self.phases[key] for key in keys if key in self.phases]
 
     def last_awake(self, part: str) -> Snapshot | None:
@@ -71,7 +79,7 @@ def rows_between(log: Arrays, start: float, end: float) -> dict[str, np.ndarray]
     return {name: a[inside] for name, a in log.items() if not name.startswith("phase_")}
 
 
-def rows_of(log: Arrays, phases: list[PhaseRecord]) -> dict[str, np.ndarray]:
+def rows_of(log: Arrays, phases: Sequence[PhaseRecord]) -> dict[str, np.ndarray]:
     """Return the log's rows from the start of the first to the end of the last of these phases."""
     return rows_between(log, phases[0].start.time, phases[-1].end.time)
 
@@ -86,6 +94,6 @@ def logged_poses(cell: Cell, part: str, q: np.ndarray) -> list[RigidTransform]:
 
 
 def logged_speed(cell: Cell, part: str, v: np.ndarray) -> np.ndarray:
-    """Return the speed (n,) of a part's origin for rows (n, nv) of the plant's velocities."""
+    """Return the speed (n,) of a part's origin for rows (n, nv) of the plant's velocities [m/s]."""
     start = cell.parts[part].joint.velocity_start()
     return np.linalg.norm(v[:, start + 3 : start + 6], axis=1)

@@ -1,4 +1,4 @@
-"""Operation insert_shaft: a part with a hole onto the shaft of the part that the jig holds.
+"""The phases that put a part with a hole onto a shaft.
 
 The hand carries the part over the shaft, then goes soft: an impedance centred on the hole lets it
 comply sideways and tilt, pushes with a limited force, and searches on a spiral if the shaft has not
@@ -9,23 +9,29 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
+from enum import Enum
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
 
 from cell.configuration.config import InsertionConfig
-from cell.products.product import Fit
+from cell.products.joints import Fit
 from cell.simulation.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
 from planning.operations.grasping import (
     HAND_SPEED,
     Reach,
+    comes_from_above,
     first,
+    jaw_to_part,
     let_go,
     lost_grasp,
+    raised,
     reachable_grasps,
     take,
 )
+from planning.operations.look import look
+from planning.operations.operation import Step
 from planning.operations.station import Station
 
 LIFT = 0.12
@@ -45,6 +51,23 @@ TOO_MUCH = 30.0  # Insertion fails above this force [N].
 Target = Callable[[float], RigidTransform]  # X_WD of the compliance centre over time [s].
 
 
+class InsertPhase(Enum):
+    """What comes besides taking the part and letting it go."""
+
+    LOOK = "look"
+    TRANSFER = "transfer"
+    LOOK_OVER_SHAFT = "look over the shaft"
+    ALIGN = "align"
+    INSERT = "insert"
+    SEARCH = "search"
+    INSERT_AGAIN = "insert again"
+    PRESS = "press"
+
+
+# Those in which the hand is soft, in their order.
+SOFT = (InsertPhase.INSERT, InsertPhase.SEARCH, InsertPhase.INSERT_AGAIN, InsertPhase.PRESS)
+
+
 @dataclass
 class Stalled:
     """End condition: a tool point has stood still for a while."""
@@ -61,44 +84,43 @@ class Stalled:
         return sensed.time - self._since >= STALL_TIME
 
 
-def insert_shaft(station: Station, fit: Fit, riders: tuple[str, ...] = ()) -> Iterator[Phase]:
+def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     """Yield the phases that put the part with the hole onto the shaft and let it go.
 
     Bolts that ride in its holes reach beyond its underside: they come to stand on the mouths of
     their threads, and their heads stay behind as the part sinks to its seat.
-
-    Args:
-        station: The planner's view of the cell.
-        fit: Which shaft, which hole, and where they meet.
-        riders: Names of the parts that lie loose on the part with the hole.
     """
+    fit, riders, arm = step.joint, step.riders, station.holder
+    assert isinstance(fit, Fit)
     part, held = fit.hole, frozenset([fit.hole, *riders])
     both = held | {fit.shaft}
+    yield from look(station, InsertPhase.LOOK, part)
     X_WGoal = goal_pose(station, fit)
     reach = first(_useful(station, fit, X_WGoal), part, station)
     yield from take(station, part, reach, LIFT, riders)
-    jaw = station.arm("left").frame(reach.grasp.jaw)
-    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
-    holding = lost_grasp(station.held_opening)
-    above = raised(X_WGoal, ABOVE) @ X_JawP.inverse()
-    q_above = station.configuration("left", jaw, above, reach.q_before, [("held", "*")])
+    jaw, holding = arm.frame(reach.grasp.jaw), lost_grasp(station)
+    above = raised(X_WGoal, ABOVE) @ jaw_to_part(station, part, reach.grasp).inverse()
+    q_above = station.configuration(arm, jaw, above, reach.q_before, [("held", "*")])
     yield Phase(
-        f"{part}: transfer",
+        InsertPhase.TRANSFER,
         motion_finished,
         timeout=20.0,
-        left=station.move("left", q_above),
+        subject=part,
+        commands={arm.name: station.move(arm, q_above)},
         guard=holding,
         awake=held,
     )
     # Once more with the part over its place: it may have turned in the grip on the way.
-    X_JawP = station.pose("left", reach.grasp.jaw).inverse() @ station.sense(part)
-    X_WGoal = goal_pose(station, fit)
+    seen = (*station.in_hand, fit.shaft)
+    yield from look(station, InsertPhase.LOOK_OVER_SHAFT, part, seen, awake=held, guard=holding)
+    X_JawP, X_WGoal = jaw_to_part(station, part, reach.grasp), goal_pose(station, fit)
     near = raised(X_WGoal, fit.depth + NEAR) @ X_JawP.inverse()
     yield Phase(
-        f"{part}: align",
+        InsertPhase.ALIGN,
         motion_finished,
         timeout=10.0,
-        left=station.line("left", jaw, near, speed=HAND_SPEED / 2),
+        subject=part,
+        commands={arm.name: station.line(arm, jaw, near, speed=HAND_SPEED / 2)},
         guard=holding,
         awake=held,
     )
@@ -107,32 +129,22 @@ def insert_shaft(station: Station, fit: Fit, riders: tuple[str, ...] = ()) -> It
 
 
 def goal_pose(station: Station, fit: Fit) -> RigidTransform:
-    """Return the sensed pose X_WP at which the part with the hole is seated."""
+    """Return the pose X_WP at which the part with the hole is seated, from what is believed."""
     shaft, hole = station.part(fit.shaft), station.part(fit.hole)
-    return station.sense(fit.shaft) @ shaft.X_AP.inverse() @ hole.X_AP
-
-
-def raised(X_WP: RigidTransform, height: float) -> RigidTransform:
-    """Return the pose moved up along +z of W."""
-    return RigidTransform(X_WP.rotation(), X_WP.translation() + [0.0, 0.0, height])
+    return station.pose_of(fit.shaft) @ shaft.X_AP.inverse() @ hole.X_AP
 
 
 def _useful(station: Station, fit: Fit, X_WGoal: RigidTransform) -> Iterator[Reach]:
     """Yield grasps of the part in the tray with which the hand also fits over the shaft."""
-    part = station.part(fit.hole)
-    for reach in reachable_grasps(station, part.name, station.sense(part.name), part.grasps):
-        jaw = station.arm("left").frame(reach.grasp.jaw)
+    arm, part = station.holder, station.part(fit.hole)
+    for reach in reachable_grasps(station, part.name, station.pose_of(part.name), part.grasps):
+        jaw = arm.frame(reach.grasp.jaw)
         goals = [raised(X_WGoal, height) @ reach.grasp.X_PJaw for height in (ABOVE, 0.0)]
-        may_touch = [("left_tool", part.name), ("held", "*")]
+        may_touch = [(station.hand, part.name), ("held", "*")]
         if all(
-            station.configurations("left", jaw, X, reach.q_before, may_touch) for X in goals
+            station.configurations(arm, jaw, X, reach.q_before, may_touch) for X in goals
         ) and comes_from_above(X_WGoal, reach.grasp.X_PJaw):
             yield reach
-
-
-def comes_from_above(X_WP: RigidTransform, X_PJaw: RigidTransform) -> bool:
-    """Return whether the hand points down at the part: it must not meet what the part comes to."""
-    return bool((X_WP @ X_PJaw).rotation().matrix()[2, 2] < -0.9)
 
 
 def _insert(
@@ -148,18 +160,26 @@ def _insert(
     # C: the compliance centre, at the mouth of the hole, with the axes of the part.
     X_PC = RigidTransform(station.part(fit.hole).X_AP.inverse() @ fit.p_AoF)
     X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
-    holding = lost_grasp(station.held_opening)
+    arm, holding = station.holder.name, lost_grasp(station)
 
-    def soft(name: str, force: float, target: Target, until: Condition, timeout: float) -> Phase:
+    def guard(sensed: Sensed) -> str | None:
+        force = float(np.linalg.norm(sensed.wrench[arm][3:]))
+        too_much = f"insertion force {force:.1f} N" if force > TOO_MUCH else None
+        return holding(sensed) or too_much
+
+    def soft(
+        kind: InsertPhase, force: float, target: Target, until: Condition, timeout: float
+    ) -> Phase:
         return Phase(
-            f"{fit.hole}: {name}",
+            kind,
             until,
             timeout=timeout,
-            left=impedance(config, jaw, X_JawC, target, force),
-            guard=lambda sensed: holding(sensed) or too_much_force(sensed),
+            subject=fit.hole,
+            commands={arm: impedance(config, jaw, X_JawC, target, force)},
+            guard=guard,
             awake=awake,
             fine_log=True,
-            tare=name == "insert",
+            tare=kind is InsertPhase.INSERT,
         )
 
     def height(sensed: Sensed) -> np.ndarray:
@@ -169,7 +189,8 @@ def _insert(
         return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
 
     start = fit.depth + NEAR
-    outcome = yield soft("insert", config.force_limit, *descent(X_WSeat, start, config, height))
+    descending = descent(X_WSeat, start, config, height)
+    outcome = yield soft(InsertPhase.INSERT, config.force_limit, *descending)
     if gap(outcome) > fit.depth / 2:
         mouth = gap(outcome)
         search = spiral(X_WSeat, mouth - BEYOND, config)
@@ -178,18 +199,14 @@ def _insert(
             return height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3
 
         length = config.search_radius**2 * np.pi / config.search_pitch
-        yield soft("search", config.search_force, search, found, length / config.search_speed)
+        yield soft(
+            InsertPhase.SEARCH, config.search_force, search, found, length / config.search_speed
+        )
         again = descent(X_WSeat, mouth - 1e-3, config, height)
-        outcome = yield soft("insert again", config.force_limit, *again)
+        outcome = yield soft(InsertPhase.INSERT_AGAIN, config.force_limit, *again)
     # Where the part has found its place: a spring that still pulls sideways would wedge it there.
     X_WC = RigidTransform(X_WSeat.rotation(), (outcome.sensed.X_WF(jaw) @ X_JawC).translation())
-    yield soft("press", config.force_limit, *pressing(X_WC, height))
-
-
-def too_much_force(sensed: Sensed) -> str | None:
-    """Guard: the wrist feels more than an insertion may take."""
-    force = float(np.linalg.norm(sensed.wrench["left"][3:]))
-    return f"insertion force {force:.1f} N" if force > TOO_MUCH else None
+    yield soft(InsertPhase.PRESS, config.force_limit, *pressing(X_WC, height))
 
 
 def impedance(

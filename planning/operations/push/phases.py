@@ -1,9 +1,10 @@
-"""Operation push: the closed left hand pushes what stands on the jig straight along a line."""
+"""The phases that push what stands on the jig straight along a line with the closed hand."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from enum import Enum
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -14,13 +15,25 @@ from planning.motion.kinematics import Unreachable, tool_pose
 from planning.motion.paths import NoPath, plan_line
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import HAND_SPEED
-from planning.operations.station import Station
+from planning.operations.look import look
+from planning.operations.operation import Step
+from planning.operations.station import FIXTURE, Station
 from planning.operations.stroke import Stroke
 
 # The hand comes from above and behind, then straight down, then slowly forward to the start.
 ABOVE, BEHIND_ABOVE = 0.12, 0.05  # [m] [A]
 BEHIND = 0.02  # [m] [A]
 MOTION_STEP = 1e-3  # Between two samples of the push's motion [s] [A].
+
+
+class PushPhase(Enum):
+    """Coming to the start of a push, and the push."""
+
+    LOOK = "approach: look"
+    ABOVE = "approach: above"
+    DOWN = "approach: down"
+    START = "approach: start"
+    PUSH = "push"
 
 
 @dataclass(frozen=True)
@@ -56,67 +69,98 @@ class PushMotion:
     motion: JointMotion
 
 
+@dataclass(frozen=True)
+class PushStep(Step):
+    """A push of a part that stands on the jig.
+
+    Attributes:
+        line: Where and how.
+    """
+
+    line: PushLine | None = None
+
+
+def carry_out(station: Station, step: Step) -> Iterator[Phase]:
+    """Yield the phases of a whole push."""
+    assert isinstance(step, PushStep) and step.line is not None
+    (part,) = step.parts
+    yield from approach(station, part, step.line)
+    yield from push(station, part, step.line)
+
+
 def can_push(station: Station, part: str, line: PushLine) -> bool:
-    """Return whether the left arm can bring its hand to a push and carry it out."""
+    """Return whether the holder can bring its hand to a push and carry it out."""
     return _found(station, part, line) is not None
-
-
-def push(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
-    """Yield the phase that pushes; the hand is at the start of the line."""
-    q = station.arm("left").positions(station.context)
-    motion = _stroke(station, q, line)
-    yield Phase("push", motion_finished, 5.0, left=motion, awake=frozenset([part]), tare=False)
 
 
 def approach(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
     """Yield the phases that bring the closed hand to the start of a push."""
+    arm = station.holder
+    yield from look(station, PushPhase.LOOK, "")
     found = _found(station, part, line)
     if found is None:
         reason = f"no joint configuration carries '{part}' along the whole push"
-        raise Unreachable("left", "tip", line.X_WT, reason)
-    frame = station.arm("left").frame("tip")
+        raise Unreachable(arm.name, "tip", line.X_WT, reason)
     yield Phase(
-        "approach: above",
+        PushPhase.ABOVE,
         motion_finished,
         timeout=20.0,
-        left=station.move("left", found.q_high, _may_touch(part)),
-        jaw=Jaw(0.0),
+        commands={
+            arm.name: station.move(arm, found.q_high, _may_touch(station, part)),
+            arm.tool.name: Jaw(0.0),
+        },
     )
-    for name, distance in (("down", -BEHIND), ("start", 0.0)):
-        motion = station.line("left", frame, line.at(distance), speed=HAND_SPEED)
-        yield Phase(f"approach: {name}", motion_finished, timeout=10.0, left=motion)
+    for kind, distance in ((PushPhase.DOWN, -BEHIND), (PushPhase.START, 0.0)):
+        motion = station.line(arm, arm.frame("tip"), line.at(distance), speed=HAND_SPEED)
+        yield Phase(kind, motion_finished, timeout=10.0, commands={arm.name: motion})
+
+
+def push(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
+    """Yield the phase that pushes; the hand is at the start of the line."""
+    arm = station.holder
+    station.model.arrange(station.surroundings(_may_touch(station, part)))
+    motion = _stroke(station, arm.positions(station.context), line)
+    yield Phase(
+        PushPhase.PUSH,
+        motion_finished,
+        5.0,
+        commands={arm.name: motion},
+        awake=frozenset([part]),
+        tare=False,
+    )
 
 
 def _found(station: Station, part: str, line: PushLine) -> PushMotion | None:
     """Return the motion from the start configuration nearest to where the arm is, if any works."""
-    arm, frame = station.arm("left"), station.arm("left").frame("tip")
-    near, may_touch = arm.positions(station.context), _may_touch(part)
-    for q in station.configurations("left", frame, line.X_WT, near, may_touch):
+    arm, context = station.holder, station.context
+    frame, near = arm.frame("tip"), arm.positions(context)
+    for q in station.configurations(arm, frame, line.X_WT, near, _may_touch(station, part)):
         try:
             motion = _stroke(station, q, line)
-            back = plan_line(arm, station.context, frame, q, line.at(-BEHIND)).waypoints[-1]
+            back = plan_line(arm, context, frame, q, line.at(-BEHIND)).waypoints[-1]
             high = line.at(-BEHIND_ABOVE, ABOVE)
-            q_high = plan_line(arm, station.context, frame, back, high).waypoints[-1]
+            q_high = plan_line(arm, context, frame, back, high).waypoints[-1]
         except (NoPath, Unreachable):
             continue
-        if station.model.is_free("left", q_high):
+        if station.model.is_free(arm.name, q_high):
             return PushMotion(q_high, motion)
     return None
 
 
-def _may_touch(part: str) -> list[tuple[str, str]]:
+def _may_touch(station: Station, part: str) -> Sequence[tuple[str, str]]:
     """Return what the hand may come close to: the push's rule keeps it clear of the bed."""
-    return [("left_tool", part), ("left_tool", "jig_base")]
+    return [(station.hand, part), (station.hand, FIXTURE)]
 
 
 def _stroke(station: Station, q_start: np.ndarray, line: PushLine) -> JointMotion:
-    """Return the joints' motion along a push line.
+    """Return the joints' motion along a push line, in the arranged surroundings.
 
     Raises:
         Unreachable: The line leaves the workspace.
         NoPath: The arm would collide or flip, or a joint is too slow.
     """
-    arm, frame, stroke = station.arm("left"), station.arm("left").frame("tip"), line.stroke
+    arm, stroke = station.holder, line.stroke
+    frame = arm.frame("tip")
     X_WT = tool_pose(arm, station.context, frame, q_start)
     goal = RigidTransform(X_WT.rotation(), X_WT.translation() + stroke.way * line.direction)
     path = plan_line(
@@ -125,9 +169,9 @@ def _stroke(station: Station, q_start: np.ndarray, line: PushLine) -> JointMotio
         frame,
         q_start,
         goal,
-        is_free=lambda q: station.model.is_free("left", q),
+        is_free=lambda q: station.model.is_free(arm.name, q),
     )
-    # Waypoints are evenly spaced along the line; between them the spline is off by below 1 um [D].
+    # Waypoints are evenly spaced on the line; between them the spline is off by less than 1 um [D].
     curve = CubicSpline(np.linspace(0.0, stroke.way, len(path.waypoints)), path.waypoints)
     time = np.linspace(0.0, stroke.duration, int(np.ceil(stroke.duration / MOTION_STEP)) + 1)
     # Just before the end, for there it stops dead.
@@ -137,5 +181,7 @@ def _stroke(station: Station, q_start: np.ndarray, line: PushLine) -> JointMotio
     fastest = np.max(np.abs(v) / limits, axis=0)
     if fastest.max() > 1.0:
         joint = arm.joints[int(fastest.argmax())].name()
-        raise NoPath("left", f"{joint} would turn at {fastest.max():.1f} times its limit in a push")
+        raise NoPath(
+            arm.name, f"{joint} would turn at {fastest.max():.1f} times its limit in a push"
+        )
     return JointMotion(time, q, v)

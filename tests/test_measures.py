@@ -10,19 +10,31 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.builder import Cell
 from cell.products.loading import load_product
-from experiments.metrics.bolts import advance, clamp_target, standing, torque_shares, trip
-from experiments.metrics.common import force_plate_peaks, moved
-from experiments.metrics.criteria import LIMITS, failed_checks
-from experiments.metrics.insert import riders_standing, seat_errors
-from experiments.metrics.loose import in_hole, measure_set_aside
-from experiments.metrics.place import placement_errors
-from experiments.metrics.record import OperationRecord, PhaseRecord, rows_between
-from experiments.metrics.snapshot import Snapshot, Wrench
-from planning.operations.sequence import Operation
+from planning.operations.bolts import in_hole, standing
+from planning.operations.grasping import HandPhase
+from planning.operations.insert_shaft import INSERT_SHAFT
+from planning.operations.insert_shaft.measures import riders_standing, seat_errors
+from planning.operations.limits import failed_checks
+from planning.operations.measures import force_plate_peaks, moved
+from planning.operations.operation import Step
+from planning.operations.pick_place.measures import placement_errors
+from planning.operations.record import PhaseRecord, StepRecord, rows_between
+from planning.operations.set_aside import SET_ASIDE
+from planning.operations.set_aside.measures import measure as measure_set_aside
+from planning.operations.set_aside.phases import AsidePhase
+from planning.operations.snapshot import Snapshot, Wrench
+from planning.operations.tighten_bolts import TIGHTEN_BOLTS
+from planning.operations.tighten_bolts.measures import (
+    advance,
+    clamp_target,
+    torque_shares,
+    trip,
+)
+from planning.operations.tighten_bolts.phases import DrivePhase
 
 PRODUCT = load_product("motor_unit")
-BOLT = PRODUCT.fasteners["bolt_1"]
-CELL = cast(Cell, SimpleNamespace(product=PRODUCT))
+BOLT = PRODUCT.screws["bolt_1"]
+CELL = cast(Cell, SimpleNamespace(product=PRODUCT, holder=SimpleNamespace(name="left")))
 
 
 def snapshot(**changes) -> Snapshot:
@@ -33,9 +45,9 @@ def snapshot(**changes) -> Snapshot:
         X_WJ=RigidTransform([0.0, 0.15, 0.2]),
         X_WP={name: X_WA @ part.X_AP for name, part in PRODUCT.parts.items()},
         V_WP={name: np.zeros(6) for name in PRODUCT.parts},
-        X_HF=dict.fromkeys(PRODUCT.fasteners, RigidTransform()),
-        turns=dict.fromkeys(PRODUCT.fasteners, 10.0),
-        clamp=dict.fromkeys(PRODUCT.fasteners, clamp_target(BOLT)),
+        X_HF=dict.fromkeys(PRODUCT.screws, RigidTransform()),
+        turns=dict.fromkeys(PRODUCT.screws, 10.0),
+        clamp=dict.fromkeys(PRODUCT.screws, clamp_target(BOLT)),
         spindle_torque=0.5,
         wrenches={},
         hand_clearance={"motor": 0.002},
@@ -119,7 +131,7 @@ def test_shares_of_torque_add_up_to_the_torque() -> None:
     # The left arm takes 0.2 N m by a force of 2 N at a lever of 0.1 m, the jig the rest.
     left = Wrench(np.array([0.0, 0.0, 0.1]), np.array([0.0, -2.0, 0.0]), p_WB + [0.1, 0.0, 0.05])
     after = snapshot(wrenches={"left": left, "force_plate": _wrench(0.1 - 0.3)})
-    shares = torque_shares(BOLT, PhaseRecord(before, after, {}))
+    shares = torque_shares("left", BOLT, PhaseRecord(before, after, {}))
     assert shares["left_arm_torque_share"] == pytest.approx(0.4)
     assert shares["jig_torque_share"] == pytest.approx(0.6)
 
@@ -156,8 +168,8 @@ def test_rows_of_an_interval_leave_out_its_start() -> None:
 
 
 def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
-    insertion = Operation("insert plate", "insert_shaft", ("plate",))
-    limits = {limit.quantity: limit.limit for limit in LIMITS if limit.kind == insertion.kind}
+    insertion = Step("insert plate", INSERT_SHAFT, ("plate",))
+    limits = {limit.quantity: limit.limit for limit in INSERT_SHAFT.limits}
     assert not failed_checks(insertion, limits)
     (failed,) = failed_checks(insertion, limits | {"gap_m": -1.0})
     assert (failed.quantity, failed.value) == ("gap_m", -1.0)
@@ -166,19 +178,20 @@ def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
 
 
 def test_limits_of_bolts_hold_for_each() -> None:
-    operation = Operation("tighten bolts", "tighten_bolts", ("bolt_1", "bolt_2"))
-    failed = [check.quantity for check in failed_checks(operation, {})]
+    step = Step("tighten bolts", TIGHTEN_BOLTS, ("bolt_1", "bolt_2"))
+    failed = [check.quantity for check in failed_checks(step, {})]
     assert {"bolt_1/torque_deviation", "bolt_2/torque_deviation"} <= set(failed)
 
 
 def test_what_remains_is_read_while_the_bolt_is_awake() -> None:
     """A sleeping bolt carries no force in the model: its last waking moment counts."""
-    record = OperationRecord(Operation("tighten bolts", "tighten_bolts", ("bolt_1",)), snapshot())
+    record = StepRecord(Step("tighten bolts", TIGHTEN_BOLTS, ("bolt_1",)), snapshot())
     late, asleep = snapshot(time=3.0), snapshot(time=5.0)
     awake = frozenset(["bolt_1"])
-    record.phases["bolt_1: stop"] = PhaseRecord(snapshot(), snapshot(time=2.0), {}, awake)
-    record.phases["bolt_2: stop"] = PhaseRecord(snapshot(), late, {}, awake)
-    record.phases["plate: retreat"] = PhaseRecord(late, asleep, {})
+    stop = PhaseRecord(snapshot(), snapshot(time=2.0), {}, awake)
+    record.phases["bolt_1", DrivePhase.STOP] = stop
+    record.phases["bolt_2", DrivePhase.STOP] = PhaseRecord(snapshot(), late, {}, awake)
+    record.phases["plate", HandPhase.RETREAT] = PhaseRecord(late, asleep, {})
     assert record.last_awake("bolt_1") is late
     assert record.last_awake("plate") is None
 
@@ -203,29 +216,29 @@ def test_loose_bolt_is_judged_in_the_hole_of_what_it_clamps() -> None:
 def test_bolts_that_rode_in_are_judged_on_their_threads() -> None:
     """Only bolts are, and each has to stand as if the hand had set it."""
     stands = RigidTransform([0.0, 0.0, BOLT.thread_depth + 2e-4])
-    state = snapshot(X_HF=dict.fromkeys(PRODUCT.fasteners, stands))
+    state = snapshot(X_HF=dict.fromkeys(PRODUCT.screws, stands))
     measured = riders_standing(PRODUCT, ("plate", "bolt_1"), state)
     assert set(measured) == {
         f"bolt_1/standing_{name}" for name in ("axial_m", "lateral_m", "tilt_rad")
     }
     assert measured["bolt_1/standing_axial_m"] == pytest.approx(2e-4)
-    back = Operation("insert plate", "insert_shaft", ("plate",), None, ("bolt_1",))
+    back = Step("insert plate", INSERT_SHAFT, ("plate",), None, ("bolt_1",))
     missing = {check.quantity for check in failed_checks(back, {})}
     assert "bolt_1/standing_axial_m" in missing
-    alone = Operation("insert plate", "insert_shaft", ("plate",))
+    alone = Step("insert plate", INSERT_SHAFT, ("plate",))
     assert not any("standing" in check.quantity for check in failed_checks(alone, {}))
 
 
 def test_part_set_aside_is_compared_with_where_it_was_taken_from() -> None:
-    operation = Operation("set aside plate", "set_aside", ("plate",), None, ("bolt_1",))
+    step = Step("set aside plate", SET_ASIDE, ("plate",), None, ("bolt_1",))
     before = snapshot()
     shift = RigidTransform(RollPitchYaw(0.0, 0.0, 0.02), [3e-4, 4e-4, 0.0])
     both = moved_part(before, "plate", shift)
     origin = before.X_WP["plate"]
-    record = OperationRecord(operation, before, origin=origin, end=both)
+    record = StepRecord(step, before, origin=origin, end=both)
     assert measure_set_aside(CELL, record, {}) == {}  # It has not been set down.
-    for phase in ("set down", "settle"):
-        record.phases[f"plate: {phase}"] = PhaseRecord(before, both, {"left": 3.1})
+    for phase in (AsidePhase.SET_DOWN, AsidePhase.SETTLE):
+        record.phases["plate", phase] = PhaseRecord(before, both, {"left": 3.1})
     measured = measure_set_aside(CELL, record, {})
     assert measured["return_error_m"] == pytest.approx(5e-4)
     assert measured["return_angle_rad"] == pytest.approx(0.02)

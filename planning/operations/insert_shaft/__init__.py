@@ -1,0 +1,28 @@
+"""Operation insert_shaft: a part with a hole onto the shaft of a part on the fixture."""
+
+from cell.products.joints import Fit
+from planning.operations.insert_shaft.limits import LIMITS
+from planning.operations.insert_shaft.measures import measure
+from planning.operations.insert_shaft.phases import carry_out
+from planning.operations.insert_shaft.plots import plots
+from planning.operations.operation import Operation, Role, Scene, Step
+
+
+def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
+    """Offer to bring a single part, if its hole fits a shaft that stands there."""
+    for fit in scene.product.fits:
+        if parts == (fit.hole,) and fit.shaft in scene.standing:
+            return Step(f"insert {fit.hole}", INSERT_SHAFT, parts, fit, riders)
+    return None
+
+
+INSERT_SHAFT = Operation(
+    name="insert_shaft",
+    carry_out=carry_out,
+    measure=measure,
+    limits=LIMITS,
+    plots=plots,
+    role=Role.BRING,
+    joint=Fit,
+    plan=plan,
+)

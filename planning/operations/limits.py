@@ -1,0 +1,78 @@
+"""When a step counts as a success: limits on what is measured, each with its reason."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from planning.operations.operation import Step
+
+
+@dataclass(frozen=True)
+class Limit:
+    """A bound on one measured quantity.
+
+    Attributes:
+        quantity: Its name.
+        limit: Largest magnitude that passes, in the unit of the quantity.
+        reason: Why this much.
+        each: Whether it holds for every one of the step's "parts" or of the "riders" on them;
+            "": it holds once.
+    """
+
+    quantity: str
+    limit: float
+    reason: str
+    each: str = ""
+
+    def names(self, step: Step) -> list[str]:
+        """Return the measured names that it bounds."""
+        if not self.each:
+            return [self.quantity]
+        parts: tuple[str, ...] = getattr(step, self.each)
+        return [f"{part}/{self.quantity}" for part in parts]
+
+
+@dataclass(frozen=True)
+class FailedCheck:
+    """A quantity outside of its limit, or that could not be measured (value None)."""
+
+    quantity: str
+    value: float | None
+    limit: float
+    reason: str
+
+
+STILL = "the jig is the fixture of every later step, and the plan knows where it holds the part"
+CAPTIVE = "0.2 mm of play and as much again where a leaning shank crosses the hole's edge"
+LEANING = np.deg2rad(5.0)
+LOOSE = "its play in the hole allows 4.6 degrees: 0.4 mm over 5 mm"
+# Of every operation on what the fixture holds.
+BASE_STAYS = (
+    Limit("base_moved_since_placed_m", 1e-3, STILL),
+    Limit("base_moved_since_placed_rad", np.deg2rad(2.0), STILL),
+)
+
+
+def standing_limits(each: str) -> tuple[Limit, ...]:
+    """Return the limits of bolts that stand on their threads, "parts" or "riders" of the step."""
+    return (
+        Limit("standing_axial_m", 1e-3, "the bit finds the socket", each),
+        Limit("standing_lateral_m", 1e-3, "the bit finds the socket", each),
+        Limit("standing_tilt_rad", LEANING, "the thread catches", each),
+    )
+
+
+def failed_checks(step: Step, measured: Mapping[str, float]) -> tuple[FailedCheck, ...]:
+    """Return every limit of a step's operation that its measured quantities do not keep."""
+    failed = []
+    for limit in step.operation.limits:
+        for name in limit.names(step):
+            value = measured.get(name)
+            if value is None or not abs(value) <= limit.limit:
+                failed.append(FailedCheck(name, value, limit.limit, limit.reason))
+    return tuple(failed)

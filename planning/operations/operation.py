@@ -1,0 +1,136 @@
+"""What an operation is, and a step of an assembly that one of them carries out.
+
+Each operation is a folder that offers one `Operation`: the joint it makes, its phases, what is
+measured of it, the limits and plots. They are found through `planning.operations.registry`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Iterator
+from dataclasses import dataclass, replace
+from enum import Enum
+from typing import TYPE_CHECKING
+
+from cell.errors import RunFailure
+from cell.products.joints import Joint
+from cell.products.product import Product
+from cell.simulation.phase import Outcome, Phase
+from planning.operations.limits import Limit
+from planning.operations.plot import Plot
+from planning.operations.record import Arrays, Measured
+
+if TYPE_CHECKING:
+    from cell.builder import Cell
+    from planning.operations.record import StepRecord
+    from planning.operations.station import Station
+
+
+class NoOperation(RunFailure):
+    """A step of a well-formed plan that none of the operations can carry out."""
+
+
+class Role(Enum):
+    """What an operation does for an assembly: the sequence asks for a role, never for a name."""
+
+    FIX = "puts a part on the empty fixture and lets it be held"
+    REMOVE = "takes what stands on the fixture off it"
+    BRING = "brings a part to what stands on the fixture"
+    FINISH = "makes joints between parts that are all there"
+
+
+@dataclass(frozen=True)
+class Scene:
+    """What stands on the fixture at one point of a plan.
+
+    Attributes:
+        product: Parts and joints.
+        standing: Names of the parts on the fixture, the one that it holds first.
+        finished: Names of the parts whose joints an operation has finished.
+    """
+
+    product: Product
+    standing: tuple[str, ...] = ()
+    finished: tuple[str, ...] = ()
+
+    def after(self, step: Step) -> Scene:
+        """Return the scene that a step leaves."""
+        role = step.operation.role
+        if role is Role.FIX:
+            return replace(self, standing=step.parts)
+        if role is Role.REMOVE:
+            return replace(self, standing=())
+        if role is Role.BRING:
+            return replace(self, standing=(*self.standing, *step.parts, *step.riders))
+        return replace(self, finished=(*self.finished, *step.parts))
+
+
+@dataclass(frozen=True)
+class Step:
+    """One step of an assembly: an operation on certain parts.
+
+    Attributes:
+        name: For example "insert plate".
+        operation: Which one.
+        parts: Names of what it moves.
+        joint: The joint that it makes, where it is a single one.
+        riders: Names of the parts that lie loose on what it moves, and come along.
+    """
+
+    name: str
+    operation: Operation
+    parts: tuple[str, ...]
+    joint: Joint | None = None
+    riders: tuple[str, ...] = ()
+
+    def phases(self, station: Station) -> Generator[Phase, Outcome, None]:
+        """Yield its phases, each built from what is believed by then.
+
+        At the end the station knows what the fixture holds now.
+        """
+        yield from self.operation.carry_out(station, self)
+        station.fixed = self.fixed_after(station.cell.product, station.fixed)
+
+    def fixed_after(self, product: Product, fixed: tuple[str, ...]) -> tuple[str, ...]:
+        """Return what the fixture holds after the step; ``fixed``: before it.
+
+        Bolts do not count: loose ones sleep while nothing touches them.
+        """
+        before = Scene(product, standing=fixed)
+        return tuple(n for n in before.after(self).standing if n not in product.screws)
+
+
+def plans_nothing(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
+    """Offer no step: the operation has no place in an assembly plan."""
+    return None
+
+
+def no_plots(cell: Cell, record: StepRecord, log: Arrays) -> list[Plot]:
+    """Return no plots."""
+    return []
+
+
+@dataclass(frozen=True)
+class Operation:
+    """An operation, as the registry lists it.
+
+    Attributes:
+        name: In results and on the command line.
+        carry_out: Yields the phases of a step.
+        measure: Returns what a recorded step is judged by, given the cell and the whole log.
+        limits: What of it has to hold.
+        plots: Returns what is worth drawing of a recorded step, given the cell and the whole log.
+        role: What it does for an assembly; None: it has no place in one.
+        joint: The kind of joint that it makes or helps to make; None: none.
+        plan: Returns the step that the operation can take in a scene, with these parts (of
+            `Role.FINISH`: with none given) and with riders on them; None where it is not meant for
+            them. Raises `NoOperation` where it is meant for them and something is missing.
+    """
+
+    name: str
+    carry_out: Callable[[Station, Step], Iterator[Phase]]
+    measure: Callable[[Cell, StepRecord, Arrays], Measured]
+    limits: tuple[Limit, ...] = ()
+    plots: Callable[[Cell, StepRecord, Arrays], list[Plot]] = no_plots
+    role: Role | None = None
+    joint: type[Joint] | None = None
+    plan: Callable[[Scene, tuple[str, ...], tuple[str, ...]], Step | None] = plans_nothing

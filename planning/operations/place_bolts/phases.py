@@ -1,0 +1,172 @@
+"""The phases that set bolts into their holes.
+
+The hand sets each bolt upright into its hole, where it stands on the mouth of the thread. If the
+part with the thread is not there yet, the bolt hangs by its head, or stands on what is below.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from enum import Enum
+
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cell.simulation.phase import Phase, Sensed, motion_finished
+from planning.operations.grasping import (
+    HAND_SPEED,
+    Reach,
+    jaw_to_part,
+    let_go,
+    lost_grasp,
+    no_grasp,
+    raised,
+    reachable_grasps,
+    take,
+)
+from planning.operations.look import look
+from planning.operations.operation import Step
+from planning.operations.station import FINE_CLEARANCE, Station
+
+LOOK_TIME = 0.05  # The bolt comes to rest in the tray [s] [A].
+LIFT = 0.06
+CLEAR_ABOVE = 0.045  # Transfers end this far above where the bolt will stand [m] [A].
+ABOVE = 0.012  # The bolt is looked at once more this far above, its tip over the hole [m] [A].
+ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
+TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
+SLOW = 0.02  # [m/s] [A]
+RETREAT = 0.05
+
+
+class BoltPhase(Enum):
+    """What comes besides taking the bolt and letting it go."""
+
+    LOOK = "look"
+    TRANSFER = "transfer"
+    LOOK_HIGH = "look over the hole"
+    COME_DOWN = "come down"
+    LOOK_LOW = "look at the hole"
+    ALIGN = "align"
+    LOOK_IN = "look in the hole"
+    LOWER = "lower"
+
+
+def carry_out(station: Station, step: Step) -> Iterator[Phase]:
+    """Yield the phases that place one bolt after another."""
+    for bolt in step.parts:
+        yield from place_bolt(station, bolt)
+
+
+def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
+    """Yield the phases that stand a bolt in its hole.
+
+    Args:
+        station: The planner's view of the cell.
+        bolt: Name of a bolt of the product.
+    """
+    arm, held = station.holder, frozenset([bolt])
+    yield from look(station, BoltPhase.LOOK, bolt, settle=LOOK_TIME, awake=held)
+    reach = _grasp_for_hole(station, bolt)
+    yield from take(station, bolt, reach, LIFT)
+    jaw, holding = arm.frame(reach.grasp.jaw), lost_grasp(station)
+    # Heights are those of a bolt that stands on the mouth of its thread.
+    X_WMouth, X_WStand = mouth_pose(station, bolt), standing_pose(station, bolt)
+
+    def at(X_WP: RigidTransform) -> RigidTransform:
+        return X_WP @ jaw_to_part(station, bolt, reach.grasp).inverse()
+
+    above = station.configuration(
+        arm, jaw, at(raised(X_WMouth, CLEAR_ABOVE)), reach.q_before, [(station.hand, bolt)]
+    )
+    yield Phase(
+        BoltPhase.TRANSFER,
+        motion_finished,
+        timeout=20.0,
+        subject=bolt,
+        commands={arm.name: station.move(arm, above)},
+        guard=holding,
+        awake=held,
+    )
+    for look_kind, kind, height, speed in (
+        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, ABOVE, HAND_SPEED),
+        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, ENTRY, SLOW),
+    ):
+        yield from look(station, look_kind, bolt, [bolt], awake=held, guard=holding)
+        line = station.line(arm, jaw, at(raised(X_WMouth, height)), speed=speed)
+        yield Phase(
+            kind,
+            motion_finished,
+            timeout=5.0,
+            subject=bolt,
+            commands={arm.name: line},
+            guard=holding,
+            awake=held,
+        )
+    # The parts on the fixture that a bolt at its hole can touch.
+    screw = station.cell.product.screws[bolt]
+    awake = held | {screw.into, screw.clamps} & frozenset(station.fixed)
+    yield from look(station, BoltPhase.LOOK_IN, bolt, [bolt], awake=awake, guard=holding)
+
+    def stands(sensed: Sensed) -> bool:
+        return sensed.finished or bool(sensed.wrench[arm.name][5] > TOUCH_FORCE)
+
+    yield Phase(
+        BoltPhase.LOWER,
+        stands,
+        timeout=10.0,
+        subject=bolt,
+        commands={arm.name: station.line(arm, jaw, at(raised(X_WStand, -2e-4)), speed=SLOW)},
+        guard=holding,
+        awake=awake,
+    )
+    yield from let_go(station, bolt, reach.grasp, RETREAT, awake)
+
+
+def seated_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP of a bolt whose head rests on what it clamps, from what is believed.
+
+    It is derived from the part that carries the thread, once that is on the fixture.
+    """
+    screw = station.cell.product.screws[bolt]
+    name = screw.into if screw.into in station.fixed else screw.clamps
+    X_WA = station.pose_of(name) @ station.part(name).X_AP.inverse()
+    return X_WA @ station.part(bolt).X_AP
+
+
+def mouth_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP of a bolt that stands on the mouth of its thread, be it there or not."""
+    out = RigidTransform([0.0, 0.0, station.cell.product.screws[bolt].thread_depth])
+    return seated_pose(station, bolt) @ out
+
+
+def standing_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP at which a bolt will stand: on its thread, or by its head where there is none.
+
+    Something else below the hole, such as the bed, may stop a bolt without a thread before.
+    """
+    if station.cell.product.screws[bolt].into in station.fixed:
+        return mouth_pose(station, bolt)
+    return seated_pose(station, bolt)
+
+
+def _grasp_for_hole(station: Station, bolt: str) -> Reach:
+    """Return a grasp with which the hand also fits between the neighbours of the hole.
+
+    Raises:
+        Unreachable: There is none.
+    """
+    arm, X_WStand = station.holder, standing_pose(station, bolt)
+    may_touch = [(station.hand, bolt), ("held", "*")]
+    grasps = station.part(bolt).grasps
+    for reach in reachable_grasps(station, bolt, station.pose_of(bolt), grasps):
+        fits = station.configurations(
+            arm,
+            arm.frame(reach.grasp.jaw),
+            X_WStand @ reach.grasp.X_PJaw,
+            reach.q_before,
+            may_touch,
+            clearance=FINE_CLEARANCE,
+        )
+        if fits and np.max(np.abs(fits[0] - reach.q_before)) < np.pi:
+            return reach
+    raise no_grasp(station, bolt)

@@ -1,0 +1,267 @@
+"""The phases that drive standing bolts home in star order.
+
+The driver comes down on one head after another: bit into socket, thread caught, run down, seated,
+tightened until the clutch trips. The gripper holds the clamped part meanwhile, or is out of the
+way.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Generator, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cell.simulation.phase import Follow, Outcome, Phase, Sensed, Spin, after, motion_finished
+from cell.workpieces.thread import BIT_SEAT
+from planning.motion.kinematics import Unreachable
+from planning.motion.timing import JointMotion
+from planning.operations.counter_hold import hold, park
+from planning.operations.grasping import backed_off, let_go, raised
+from planning.operations.look import look
+from planning.operations.operation import Step
+from planning.operations.station import FINE_CLEARANCE, Station
+
+BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
+LEAVE_SPEED = 0.1  # Of the bit out of it [m/s] [A].
+PLUNGE_SPEED = 0.04  # Of the bit down to the socket [m/s] [A].
+FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
+SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
+FEED_DEPTH = 0.008  # The feed can follow the bolt this far [m]: engaged length and reserve.
+FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
+FEED_LIMIT = 0.02  # [m/s] [A]
+STOP_TIME = 0.05  # Of the spindle [s] [A].
+CLUTCH_TIME = 0.002  # The clutch does not feel shorter shocks [s] [A].
+REST_TIME = 0.2  # [s] [A]
+RETREAT = 0.05  # Of the gripper from what it held [m] [A].
+
+
+class DrivePhase(Enum):
+    """What comes besides holding the clamped part."""
+
+    LOOK = "look"
+    DRIVER_ABOVE = "driver above"
+    LOOK_AT_HEAD = "look at the head"
+    BIT_IN = "bit into socket"
+    RUN_DOWN = "run down"
+    TIGHTEN = "tighten"
+    STOP = "stop"
+    DRIVER_OFF = "driver off"
+    REST = "rest"
+
+
+# Those in which the bolt turns in its thread, in their order.
+DRIVEN = (DrivePhase.RUN_DOWN, DrivePhase.TIGHTEN)
+
+
+def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
+    """Return the bolts so that each is as far as possible from those before it.
+
+    Ties go to the one farthest from the latest bolt: 1, 4, then across again, as on a wheel.
+    """
+    place = {bolt: station.part(bolt).X_AP.translation() for bolt in bolts}
+    order, remaining = [bolts[0]], list(bolts[1:])
+    while remaining:
+
+        def spread(bolt: str) -> tuple[float, float]:
+            distances = [float(np.linalg.norm(place[bolt] - place[done])) for done in order]
+            return round(min(distances), 6), distances[-1]
+
+        order.append(max(remaining, key=spread))
+        remaining.remove(order[-1])
+    return order
+
+
+@dataclass
+class Feed:
+    """Servo of the driver's arm: sink so that the bit holder's spring pushes with a set force.
+
+    Attributes:
+        tool: Name of the driver.
+        line: Motion straight down, as a path to be followed at the servo's own pace.
+        length: Of that path [m].
+        thrust: Wanted axial force on the bit [N].
+        dt: Time step [s].
+        progress: Time on the line reached so far [s].
+    """
+
+    tool: str
+    line: JointMotion
+    length: float
+    thrust: float
+    dt: float
+    progress: float = 0.0
+
+    def __call__(self, sensed: Sensed) -> tuple[np.ndarray, np.ndarray]:
+        """Return the joint target for the next step."""
+        missing = self.thrust - sensed.drivers[self.tool].push
+        speed = float(np.clip(FEED_GAIN * missing, -FEED_LIMIT, FEED_LIMIT))
+        rate = speed * self.line.duration / self.length
+        self.progress = float(np.clip(self.progress + rate * self.dt, 0.0, self.line.duration))
+        q, v = self.line.at(self.progress)
+        return q, v * rate
+
+
+@dataclass
+class Clutch:
+    """End condition: the spindle has kept up a torque; a shock does not trip it.
+
+    Attributes:
+        tool: Name of the driver.
+        torque: To trip at [N m].
+    """
+
+    tool: str
+    torque: float
+    _reached: float | None = None
+
+    def __call__(self, sensed: Sensed) -> bool:
+        """Return whether the clutch trips."""
+        if sensed.drivers[self.tool].torque < self.torque:
+            self._reached = None
+        elif self._reached is None:
+            self._reached = sensed.time
+        # Times are multiples of the step, so half a microsecond only absorbs rounding.
+        return self._reached is not None and sensed.time >= self._reached + CLUTCH_TIME - 5e-7
+
+
+def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
+    """Yield the phases that tighten every bolt of a step."""
+    clamped = station.cell.product.screws[step.parts[0]].clamps
+    assembly = frozenset([*station.fixed, *step.parts])
+    yield from look(station, DrivePhase.LOOK, clamped)
+    if station.config.driver.counter_hold:
+        grasp = yield from hold(station, clamped)
+        for bolt in star_order(station, step.parts):
+            yield from tighten_bolt(station, bolt)
+        yield from let_go(station, clamped, grasp, RETREAT, assembly)
+    else:
+        yield from park(station)
+        for bolt in star_order(station, step.parts):
+            yield from tighten_bolt(station, bolt)
+    # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
+    yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
+
+
+def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]:
+    """Yield the phases that drive one bolt home."""
+    driver, spindle = station.driver, station.driver.tool.name
+    config, root = station.config, station.root
+    tip, screw = driver.frame("tool_tip"), station.cell.product.screws[bolt]
+    threads, awake = station.cell.threads, _awake(station, bolt)
+
+    yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
+    holding = [(station.hand, part) for part in station.fixed]
+    above = _driver_configuration(
+        station, backed_off(_socket_pose(station, bolt), BIT_HOVER), holding
+    )
+    yield Phase(
+        DrivePhase.DRIVER_ABOVE,
+        motion_finished,
+        timeout=20.0,
+        subject=bolt,
+        commands={
+            driver.name: station.move(driver, above, holding, clearance=FINE_CLEARANCE),
+            spindle: Spin(0.0),
+        },
+        awake=_awake(station),
+    )
+    yield from look(station, DrivePhase.LOOK_AT_HEAD, bolt, [bolt], awake=_awake(station))
+    R_WE = station.tool_pose(driver, "tool_tip").rotation()
+    X_WE = RigidTransform(R_WE, _socket_pose(station, bolt).translation())
+    outcome = yield Phase(
+        DrivePhase.BIT_IN,
+        # That the hex has dropped into the socket is told by the model of the joint between them,
+        # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
+        lambda sensed: sensed.finished and threads.bit_engaged(root, bolt),
+        timeout=5.0,
+        subject=bolt,
+        commands={
+            driver.name: station.line(driver, tip, X_WE, speed=PLUNGE_SPEED),
+            spindle: Spin(FIND_SPEED),
+        },
+        awake=awake,
+    )
+
+    # The bolt stood on the mouth of its thread when the bit dropped in: how far it has to sink is
+    # known from then on, wherever it was seen to stand.
+    bit = driver.frame("bit_tip")
+    mouth = outcome.sensed.X_WF(bit).translation()[2]
+    down = raised(station.tool_pose(driver, "tool_tip"), -FEED_DEPTH)
+    line = station.line(driver, tip, down, speed=FEED_LIMIT)
+    feed = Follow(
+        Feed(spindle, line, FEED_DEPTH, config.driver.push_force, config.simulation.time_step)
+    )
+
+    def nearly_seated(sensed: Sensed) -> bool:
+        sunk = mouth - sensed.X_WF(bit).translation()[2]
+        return bool(sunk > screw.thread_depth - SLOW_BELOW)
+
+    yield Phase(
+        DrivePhase.RUN_DOWN,
+        nearly_seated,
+        timeout=10.0,
+        subject=bolt,
+        commands={driver.name: feed, spindle: Spin(config.driver.free_speed)},
+        awake=awake,
+    )
+    station.driven += (bolt,)
+    yield Phase(
+        DrivePhase.TIGHTEN,
+        Clutch(spindle, screw.torque),
+        timeout=5.0,
+        subject=bolt,
+        commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
+        awake=awake,
+        fine_log=True,
+    )
+    yield Phase(
+        DrivePhase.STOP,
+        after(STOP_TIME),
+        timeout=1.0,
+        subject=bolt,
+        commands={spindle: Spin(0.0)},
+        awake=awake,
+    )
+    off = backed_off(station.tool_pose(driver, "tool_tip"), BIT_HOVER + FEED_DEPTH)
+    yield Phase(
+        DrivePhase.DRIVER_OFF,
+        motion_finished,
+        timeout=5.0,
+        subject=bolt,
+        commands={driver.name: station.line(driver, tip, off, speed=LEAVE_SPEED)},
+        awake=awake,
+    )
+
+
+def _awake(station: Station, *bolts: str) -> frozenset[str]:
+    """Return what bears a tightening: the assembly, the bolts driven so far, and others."""
+    return frozenset([*station.fixed, *station.driven, *bolts])
+
+
+def _socket_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return the pose of the bit's end when it sits in the socket of a bolt, pointing down."""
+    p_WE = station.pose_of(bolt) @ np.array([0.0, 0.0, BIT_SEAT])
+    return RigidTransform(RotationMatrix.MakeXRotation(np.pi), p_WE)
+
+
+def _driver_configuration(
+    station: Station, X_WE: RigidTransform, may_touch: Sequence[tuple[str, str]]
+) -> np.ndarray:
+    """Return the nearest configuration (n,) with the driver turned any way about its own axis.
+
+    Raises:
+        Unreachable: There is none.
+    """
+    driver = station.driver
+    tip, near = driver.frame("tool_tip"), driver.positions(station.context)
+    found: list[np.ndarray] = []
+    for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
+        X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
+        found += station.configurations(driver, tip, X, near, may_touch, clearance=FINE_CLEARANCE)
+    if not found:
+        reason = "no turn of the driver keeps clear there"
+        raise Unreachable(driver.name, tip.name(), X_WE, reason)
+    return min(found, key=lambda q: float(np.max(np.abs(q - near))))

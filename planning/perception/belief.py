@@ -1,0 +1,199 @@
+"""Where the parts are, as far as the planner knows: frozen, timed estimates that a look refreshes.
+
+A part in the hand follows the hand by kinematics from where it was last seen; every other part is
+taken to stay where it was last seen. Frames: W of the world, P of a part, H of the hand.
+"""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from typing import Protocol
+
+import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.systems.framework import Context
+
+from cell.builder import Cell
+from cell.errors import UnknownName
+from cell.workpieces.parts import Parts
+
+State = dict[str, np.ndarray]
+SEEN, CARRIED, SOURCE = "seen/", "carried/", "source"  # Keys of a saved belief.
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """What one look says about a part.
+
+    Attributes:
+        X_WP: Its pose.
+        covariance: (6, 6) of the error: turns about the axes of P [rad2], then offsets along the
+            axes of W [m2].
+        time: When it was seen [s].
+    """
+
+    X_WP: RigidTransform
+    covariance: np.ndarray
+    time: float
+
+
+class Source(Protocol):
+    """A way to see.
+
+    Attributes:
+        duration: How long everything has to stand still for a look [s].
+    """
+
+    duration: float
+
+    def look(self, parts: Sequence[str]) -> Mapping[str, Estimate]:
+        """Return where parts are now, by name; a part that is not seen is left out."""
+        ...
+
+    def save(self) -> np.ndarray:
+        """Return what the next look depends on besides the scene, such as a random state."""
+        ...
+
+    def restore(self, state: np.ndarray) -> None:
+        """Return to a saved state."""
+
+
+@dataclass
+class TruthSource:
+    """The truth plus configurable noise.
+
+    Attributes:
+        parts: What can be seen.
+        context: Of the plant, only read.
+        position_noise: Standard deviation along each axis [m].
+        angle_noise: Standard deviation about each axis [rad].
+        rng: Of the noise.
+        duration: See `Source`; the truth is known at once.
+    """
+
+    parts: Parts
+    context: Context
+    position_noise: float
+    angle_noise: float
+    rng: np.random.Generator
+    duration: float = 0.0
+
+    @staticmethod
+    def of(cell: Cell, root: Context, seed: int) -> TruthSource:
+        """Return the source that a cell's configuration describes.
+
+        Args:
+            cell: The cell.
+            root: Context of the diagram.
+            seed: Of the noise.
+        """
+        noise = cell.config.sensor
+        return TruthSource(
+            cell.parts,
+            cell.plant.GetMyContextFromRoot(root),
+            noise.position_noise,
+            np.deg2rad(noise.angle_noise_deg),
+            np.random.default_rng(seed),
+        )
+
+    def look(self, parts: Sequence[str]) -> dict[str, Estimate]:
+        """Return where parts are now, each with noise of its own."""
+        sigma = np.repeat([self.angle_noise, self.position_noise], 3)
+        time = self.context.get_time()
+        return {name: Estimate(self._pose(name), np.diag(sigma**2), time) for name in parts}
+
+    def _pose(self, name: str) -> RigidTransform:
+        X_WP = self.parts[name].X_WP(self.context)
+        if self.position_noise == 0.0 and self.angle_noise == 0.0:
+            return X_WP
+        offset = self.rng.normal(scale=self.position_noise, size=3)
+        turn = RollPitchYaw(self.rng.normal(scale=self.angle_noise, size=3)).ToRotationMatrix()
+        return RigidTransform(X_WP.rotation() @ turn, X_WP.translation() + offset)
+
+    def save(self) -> np.ndarray:
+        """Return the state of the random generator."""
+        return np.array(repr(self.rng.bit_generator.state))
+
+    def restore(self, state: np.ndarray) -> None:
+        """Return to a saved state of the random generator."""
+        self.rng.bit_generator.state = ast.literal_eval(str(state))
+
+
+@dataclass
+class Belief:
+    """The latest estimate of every part that has been seen.
+
+    Attributes:
+        source: A way to see.
+        hand: Returns the pose X_WH of the hand now, from the joint encoders.
+        estimates: By name of the part.
+        carried: By name of a part in the hand, X_WH at the moment its estimate speaks of.
+    """
+
+    source: Source
+    hand: Callable[[], RigidTransform]
+    estimates: dict[str, Estimate] = field(default_factory=dict)
+    carried: dict[str, RigidTransform] = field(default_factory=dict)
+
+    def look(self, parts: Sequence[str]) -> None:
+        """Replace what is known of parts by what is seen of them now."""
+        seen = self.source.look(parts)
+        self.estimates.update(seen)
+        for name in self.carried.keys() & seen.keys():
+            self.carried[name] = self.hand()
+
+    def pose(self, part: str) -> RigidTransform:
+        """Return the believed pose X_WP of a part now.
+
+        Raises:
+            UnknownName: It has never been seen.
+        """
+        if part not in self.estimates:
+            raise UnknownName("part that has been seen", part, self.estimates)
+        X_WP = self.estimates[part].X_WP
+        if part not in self.carried:
+            return X_WP
+        X_WH, X_WH_then = self.hand(), self.carried[part]
+        # A hand that has not moved adds no rounding.
+        return X_WP if X_WH.IsExactlyEqualTo(X_WH_then) else X_WH @ X_WH_then.inverse() @ X_WP
+
+    def carry(self, parts: Iterable[str]) -> None:
+        """Let parts follow the hand from now on."""
+        self.carried = dict.fromkeys(parts, self.hand())
+
+    def put_down(self) -> None:
+        """Leave the parts in the hand where they are believed to be now."""
+        for part in self.carried:
+            self.estimates[part] = replace(self.estimates[part], X_WP=self.pose(part))
+        self.carried = {}
+
+    def save(self) -> State:
+        """Return everything that changes as named arrays."""
+        state: State = {SOURCE: self.source.save()}
+        for name, estimate in self.estimates.items():
+            state[f"{SEEN}{name}/X_WP"] = estimate.X_WP.GetAsMatrix4()
+            state[f"{SEEN}{name}/covariance"] = estimate.covariance
+            state[f"{SEEN}{name}/time"] = np.array(estimate.time)
+        for name, X_WH in self.carried.items():
+            state[f"{CARRIED}{name}"] = X_WH.GetAsMatrix4()
+        return state
+
+    def restore(self, state: Mapping[str, np.ndarray]) -> None:
+        """Return to what `save` returned."""
+        self.source.restore(state[SOURCE])
+        keys = [key.removesuffix("/X_WP") for key in state if key.endswith("/X_WP")]
+        self.estimates = {
+            key.removeprefix(SEEN): Estimate(
+                RigidTransform(state[f"{key}/X_WP"]),
+                state[f"{key}/covariance"],
+                float(state[f"{key}/time"]),
+            )
+            for key in keys
+        }
+        self.carried = {
+            key.removeprefix(CARRIED): RigidTransform(X_WH)
+            for key, X_WH in state.items()
+            if key.startswith(CARRIED)
+        }

@@ -1,0 +1,59 @@
+"""The registry: every operation is a folder, and its name is written nowhere else."""
+
+from __future__ import annotations
+
+import ast
+import io
+import tokenize
+from pathlib import Path
+
+import pytest
+
+import planning.operations
+from cell.products.joints import JOINT_TYPES
+from planning.operations.operation import Operation, Role
+from planning.operations.registry import OPERATIONS
+
+FOLDER = Path(planning.operations.__file__).parent
+ROOT = FOLDER.parent.parent
+FOLDERS = sorted(path.parent for path in FOLDER.glob("*/__init__.py"))
+SOURCES = sorted(
+    path
+    for package in ("cell", "planning", "experiments")
+    for path in (ROOT / package).rglob("*.py")
+    if path.parent not in FOLDERS
+)
+
+
+def test_every_folder_is_registered() -> None:
+    modules = {operation.carry_out.__module__.split(".")[2] for operation in OPERATIONS.values()}
+    assert modules == {folder.name for folder in FOLDERS}
+
+
+def words_of(path: Path) -> set[str]:
+    """Return the texts written in a source file, documentation apart."""
+    texts = set()
+    for token in tokenize.generate_tokens(io.StringIO(path.read_text()).readline):
+        if token.type == tokenize.STRING and not token.string.endswith('"""'):
+            text = ast.literal_eval(token.string) if token.string[0] in "\"'" else token.string
+            texts.add(str(text))
+    return texts
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: path.relative_to(ROOT).as_posix())
+def test_name_of_an_operation_is_written_in_its_folder_only(path: Path) -> None:
+    """But for the scripts, which are called as their operations are."""
+    named = words_of(path) & set(OPERATIONS) - {"push"}  # An experiment is called that, too.
+    if path.parent == ROOT / "experiments":
+        named -= {path.stem}
+    assert not named
+
+
+@pytest.mark.parametrize("operation", OPERATIONS.values(), ids=OPERATIONS)
+def test_limits_have_reasons_and_joints_are_of_the_products(operation: Operation) -> None:
+    assert all(limit.reason and limit.limit > 0 for limit in operation.limits)
+    assert operation.joint is None or operation.joint in JOINT_TYPES.values()
+
+
+def test_every_role_is_taken() -> None:
+    assert {operation.role for operation in OPERATIONS.values()} >= set(Role)
