@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
     InputPort,
     LeafSystem,
     OutputPort,
+    PortDataType,
 )
 
 from cell.errors import InputError, UnknownName
@@ -49,10 +50,10 @@ class Ports:
         port = self.inputs[name]
         if builder.IsConnectedOrExported(port):
             raise InputError(f"Input '{name}' of the cell is connected already.")
-        if source.size() != port.size():
+        if _contents(source) != _contents(port):
             raise InputError(
-                f"Input '{name}' of the cell takes {port.size()} numbers, "
-                f"not the {source.size()} of '{source.GetFullDescription()}'."
+                f"Input '{name}' of the cell takes {_contents(port)}, not the {_contents(source)} "
+                f"of output '{source.get_name()}' of '{source.get_system().get_name()}'."
             )
         builder.Connect(source, port)
 
@@ -68,6 +69,12 @@ class Ports:
             builder.ExportInput(port, name)
         for name, port in self.outputs.items():
             builder.ExportOutput(port, name)
+
+
+def _contents(port: InputPort | OutputPort) -> str:
+    """Return what a port carries, in words."""
+    vector = port.get_data_type() == PortDataType.kVectorValued
+    return f"{port.size()} numbers" if vector else "objects"
 
 
 class PartPoses(LeafSystem):
