@@ -57,8 +57,9 @@ def link_sdf(name, parent, xyz, rpy):
     </joint>"""
 
 
-parents = ["base_link", *TABLE]
-links = "".join(link_sdf(n, p, *pose) for (n, pose), p in zip(TABLE.items(), parents))
+parents = ["base_link", *TABLE][:-1]
+rows = zip(TABLE.items(), parents, strict=True)
+links = "".join(link_sdf(name, parent, *pose) for (name, pose), parent in rows)
 SDF = FOLDER / "my_arm.sdf"
 SDF.write_text(f"""<sdf version="1.9"><model name="my_arm">
     <link name="base_link"/>{links}

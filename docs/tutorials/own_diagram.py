@@ -1,7 +1,7 @@
 """The cell in your own diagram: your body, your controller, Drake's own Simulator.
 
 The left arm presses a box into the bag and the pump freezes the beads around it: the jaws slip off
-when they pull with 6 N. Once air is back in, they lift the box.
+when they pull with 5 N. Once air is back in, they lift the box.
 """
 
 import numpy as np
@@ -65,12 +65,10 @@ arm.tool.command(root, opening=SIZE[0], force=20.0)
 
 def run_until(time, what):
     simulator.AdvanceTo(time)
-    height = (plant.EvalBodyPoseInWorld(context, box).translation() - X_WTop.translation())[2]
-    pull = -arm.wrist.read(context)[5]
-    print(
-        f"{time} s, {what}: box at {1e3 * (height - SIZE[2] / 2):+.2f} mm, the arm pulls {pull:+.1f} N"
-    )
-    return height
+    p_TopB = X_WTop.inverse() @ plant.EvalBodyPoseInWorld(context, box).translation()
+    z, pull = p_TopB[2] - SIZE[2] / 2, -arm.wrist.read(context)[5]
+    print(f"{time} s, {what}: box at {1e3 * z:+.2f} mm, the arm pulls with {pull:+.1f} N")
+    return z
 
 
 run_until(0.7, "pressed")

@@ -7,11 +7,17 @@ lives in the Context, so that two Contexts of one diagram do not meet.
 import numpy as np
 import trimesh
 from pydrake.common.value import Value
-from pydrake.geometry import AddCompliantHydroelasticProperties, AddRigidHydroelasticProperties
-from pydrake.geometry import Box, Convex, ProximityProperties
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    Box,
+    Convex,
+    ProximityProperties,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialForce
-from pydrake.multibody.plant import ExternallyAppliedSpatialForce
+from pydrake.multibody.plant import CoulombFriction, ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import BodyIndex, SpatialInertia
 from pydrake.systems.analysis import Simulator
 
@@ -41,6 +47,7 @@ class MagnetPlate(Fixture):
         self.X_BJ = RigidTransform() if X_BJ is None else X_BJ
         touch = ProximityProperties()
         AddCompliantHydroelasticProperties(0.03, 1e9, touch)
+        AddContactMaterial(friction=CoulombFriction(0.3, 0.3), properties=touch)
         X_BPlate = self.X_BJ @ RigidTransform([0.0, 0.0, PLATE[2] / 2])
         plant.RegisterVisualGeometry(base, X_BPlate, Box(*PLATE), "magnet", np.full(4, 0.5))
         plant.RegisterCollisionGeometry(base, X_BPlate, Box(*PLATE), "magnet", touch)
@@ -135,6 +142,7 @@ def add_box(plant, scene_graph):
     box = plant.AddRigidBody("box", plant.AddModelInstance("box"), inertia)
     touch = ProximityProperties()
     AddRigidHydroelasticProperties(0.01, touch)
+    AddContactMaterial(friction=CoulombFriction(0.3, 0.3), properties=touch)
     plant.RegisterCollisionGeometry(box, RigidTransform(), Box(*SIZE), "box", touch)
 
 
