@@ -16,7 +16,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.configuration.config import CellConfig
-from cell.errors import UnknownName
+from cell.errors import InputError, UnknownName
 from cell.fixtures import add_fixture
 from cell.fixtures.base import Fixture
 from cell.fixtures.wiring import wire_fixture
@@ -155,10 +155,16 @@ def add_cell(
             caller's own.
 
     Raises:
-        InputError: A product without simulation models, an unknown device or fixture.
+        InputError: A product without simulation models, an unknown device or fixture, a name that
+            another cell in the builder has.
     """
     product.check_simulable()
     prefix = f"{name}_" if name else ""
+    if builder.HasSubsystemNamed(f"{prefix}plant"):
+        raise InputError(
+            f"There is a system '{prefix}plant' in the builder already: give each cell a name of "
+            "its own, add_cell(builder, config, product, name=...)."
+        )
     counter = builder.AddNamedSystem(f"{prefix}steps", StepCounter(config.simulation.time_step))
     drives = make_drives(config)
     for arm, own in drives.items():
