@@ -203,7 +203,7 @@ def add_cell(
     _check_names(builder)
 
     def reset(root: Context) -> None:
-        threads.reset(root)
+        threads.install(root)
         jig_base.reset(root)
         fixture.install(root)
 

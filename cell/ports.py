@@ -43,19 +43,24 @@ class Ports:
         """Connect a caller's output to an input of the cell.
 
         Raises:
-            InputError: No such input, something is connected to it already, or another size.
+            InputError: No such input, something is connected to it already, another size or type,
+                or a system that is not in this builder.
         """
         if name not in self.inputs:
             raise UnknownName("input of the cell", name, self.inputs)
         port = self.inputs[name]
         if builder.IsConnectedOrExported(port):
             raise InputError(f"Input '{name}' of the cell is connected already.")
-        if _contents(source) != _contents(port):
+        mine = f"'{source.get_system().get_name()}.{source.get_name()}'"
+        if source.get_data_type() != port.get_data_type() or source.size() != port.size():
             raise InputError(
-                f"Input '{name}' of the cell takes {_contents(port)}, not the {_contents(source)} "
-                f"of output '{source.get_name()}' of '{source.get_system().get_name()}'."
+                f"Input '{name}' of the cell takes {_kind(port)}; {mine} is {_kind(source)}."
             )
-        builder.Connect(source, port)
+        try:
+            builder.Connect(source, port)
+        except RuntimeError as error:
+            reason = str(error).splitlines()[0]
+            raise InputError(f"{mine} cannot be connected to input '{name}': {reason}") from error
 
     def output(self, name: str) -> OutputPort:
         """Return an output by its name."""
@@ -71,10 +76,10 @@ class Ports:
             builder.ExportOutput(port, name)
 
 
-def _contents(port: InputPort | OutputPort) -> str:
-    """Return what a port carries, in words."""
+def _kind(port: InputPort | OutputPort) -> str:
+    """Return what a port carries."""
     vector = port.get_data_type() == PortDataType.kVectorValued
-    return f"{port.size()} numbers" if vector else "objects"
+    return f"a vector of {port.size()}" if vector else "an abstract value"
 
 
 class PartPoses(LeafSystem):

@@ -8,7 +8,7 @@ import trimesh
 from scipy.spatial.transform import Rotation
 from test_contact_mesh import MOTOR, PARAMS, RIM_SQUEEZE, box, overlap, pressed
 
-from cell.fixtures.soft_jig import contact_mesh
+from cell.fixtures.soft_jig.mesh import contact_mesh
 from cell.fixtures.soft_jig.mesh.contact_mesh import imprint_mesh
 from cell.fixtures.soft_jig.mesh.leaning_bed import LeaningBed
 from cell.fixtures.soft_jig.soft.bed import Bed

@@ -125,7 +125,7 @@ class ArmDrive(JointDrive):
         self._mode = self.DeclareDiscreteState([0.0])  # 1 while torques are commanded.
         self._actuators: tuple[JointActuator, ...] = ()
         self._mode_of_model = False  # What the gains in the plant's model are at present.
-        # Unrestricted like the plant's step: all of these come before any discrete update.
+        # Of the same kind as the plant's own update: Drake runs all unrestricted ones first.
         self.DeclarePeriodicUnrestrictedUpdateEvent(time_step, 0.0, self._set_gains)
 
     def drive(self, actuators: Sequence[JointActuator]) -> None:
