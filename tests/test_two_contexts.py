@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 
 from cell import Cell, CellConfig, InputError, Product, add_cell, build_cell
 
@@ -48,12 +47,3 @@ def test_two_cells_of_one_name_are_refused() -> None:
     add_cell(builder, CellConfig(), EMPTY)
     with pytest.raises(InputError, match="two systems named .*plant.*name="):
         add_cell(builder, CellConfig(), EMPTY)
-
-
-@pytest.mark.parametrize("name", ["left.desired_state", "external_forces"])
-def test_an_output_of_another_size_is_refused(name: str) -> None:
-    builder = DiagramBuilder()
-    cell = add_cell(builder, CellConfig(), EMPTY)
-    source = builder.AddNamedSystem("mine", ConstantVectorSource(np.zeros(5)))
-    with pytest.raises(InputError, match=rf"'{name}' .* 5 numbers .* of 'mine'"):
-        cell.ports.connect(builder, source.get_output_port(), name)
