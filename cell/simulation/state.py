@@ -1,7 +1,7 @@
 """Save and restore all state of a run: continuing from a restored state is bit-identical.
 
 A saved state is a flat mapping of names to arrays. It also says what it is of: product,
-configuration and Drake's version; a state of another cell is refused.
+configuration, bodies and Drake's version; a state of another cell is refused.
 """
 
 from __future__ import annotations
@@ -85,13 +85,19 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
 
 
 def _identity(cell: Cell) -> dict[str, str]:
-    """Return what a saved state holds for: product, configuration, Drake's version."""
+    """Return what a saved state holds for: product, configuration, bodies, Drake's version."""
     text = json.dumps(cell.config.to_dict(), sort_keys=True, default=str)
     return {
         "product": cell.product.name,
-        "configuration": hashlib.sha256(text.encode()).hexdigest()[:16],
+        "configuration": _digest(text),
+        # A caller may have added some.
+        "set of bodies": _digest(*cell.plant.GetStateNames()),
         "Drake": version("drake"),
     }
+
+
+def _digest(*texts: str) -> str:
+    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
 
 
 def _check_identity(cell: Cell, saved: Mapping[str, Any]) -> None:
