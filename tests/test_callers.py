@@ -70,7 +70,7 @@ def adds(shape: Shape) -> Extend:
     """Return what adds a body "mine" for the bag to hold."""
 
     def extend(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
-        inertia = SpatialInertia.SolidCubeWithMass(0.1, 0.03)
+        inertia = SpatialInertia.SolidBoxWithMass(0.1, 0.03, 0.03, 0.03)
         body = plant.AddRigidBody("mine", plant.AddModelInstance("mine"), inertia)
         touch = ProximityProperties()
         plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "bed_mine", touch)
