@@ -2,11 +2,27 @@
 
 import numpy as np
 import pytest
+import trimesh
+from pydrake.geometry import Box, Cylinder, ProximityProperties, SceneGraph, Shape
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
-from pydrake.systems.primitives import ConstantVectorSource
 
-from cell import Cell, CellConfig, InputError, Product, add_cell, build_cell
+from cell import (
+    Cell,
+    CellConfig,
+    FixtureError,
+    InputError,
+    Product,
+    Simulation,
+    add_cell,
+    build_cell,
+    restore_state,
+    save_state,
+)
+from cell.builder import Extend
 
 EMPTY = Product("nothing", {})
 TORQUE = [0.0, 0.0, 0.0, 0.0, 0.0, 1.0]  # [N m]
@@ -50,10 +66,29 @@ def test_two_cells_of_one_name_are_refused() -> None:
         add_cell(builder, CellConfig(), EMPTY)
 
 
-@pytest.mark.parametrize("name", ["left.desired_state", "external_forces"])
-def test_an_output_of_another_size_is_refused(name: str) -> None:
-    builder = DiagramBuilder()
-    cell = add_cell(builder, CellConfig(), EMPTY)
-    source = builder.AddNamedSystem("mine", ConstantVectorSource(np.zeros(5)))
-    with pytest.raises(InputError, match=rf"'{name}' .* 5 numbers .* of 'mine'"):
-        cell.ports.connect(builder, source.get_output_port(), name)
+def adds(shape: Shape) -> Extend:
+    """Return what adds a body "mine" for the bag to hold."""
+
+    def extend(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
+        inertia = SpatialInertia.SolidBoxWithMass(0.1, 0.03, 0.03, 0.03)
+        body = plant.AddRigidBody("mine", plant.AddModelInstance("mine"), inertia)
+        touch = ProximityProperties()
+        plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "bed_mine", touch)
+
+    return extend
+
+
+def test_a_shape_that_the_bed_cannot_conform_to_is_refused_before_the_press() -> None:
+    cell = build_cell(CellConfig(), EMPTY, extend=adds(Cylinder(0.015, 0.03)))
+    _, root = start(cell)
+    mesh = trimesh.creation.cylinder(0.015, 0.03)
+    with pytest.raises(FixtureError, match="'bed_mine' is a Cylinder"):
+        cell.fixture.receive(root, cell.plant.GetBodyByName("mine"), mesh)
+
+
+def test_a_state_of_other_bodies_is_refused() -> None:
+    """Drake would end the process over the number of positions."""
+    with_body = build_cell(CellConfig(), EMPTY, extend=adds(Box(0.03, 0.03, 0.03)))
+    without = Simulation(build_cell(CellConfig(), EMPTY))
+    with pytest.raises(InputError, match="another set of bodies"):
+        restore_state(without, save_state(Simulation(with_body)))
