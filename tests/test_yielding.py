@@ -9,7 +9,7 @@ import pytest
 
 from cell.fixtures.soft_jig import JigParameters
 from cell.fixtures.soft_jig.frozen.yielding import Patch, Strength, returned
-from cell.fixtures.soft_jig.mesh.columns import TetMesh
+from cell.fixtures.soft_jig.mesh.tet_mesh import TetMesh
 from cell.fixtures.soft_jig.parameters import SoilParameters
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import Prism
