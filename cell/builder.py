@@ -24,6 +24,7 @@ from cell.machines.arm import Arm
 from cell.machines.devices import add_arms, make_drives
 from cell.machines.drive import JointDrive
 from cell.machines.driver import Driver
+from cell.machines.gripper import Gripper
 from cell.machines.jig_base import JigBase, set_sliding_friction
 from cell.machines.sensors import WrenchSensor
 from cell.machines.workcell import add_workcell
@@ -96,6 +97,20 @@ class Cell:
     def driver(self) -> Arm:
         """The arm that drives bolts."""
         return self.arm_with("driver")
+
+    @property
+    def gripper(self) -> Gripper:
+        """The tool of the holder."""
+        tool = self.holder.tool
+        assert isinstance(tool, Gripper)
+        return tool
+
+    @property
+    def screwdriver(self) -> Driver:
+        """The tool of the driver."""
+        tool = self.driver.tool
+        assert isinstance(tool, Driver)
+        return tool
 
     @property
     def drives(self) -> dict[str, JointDrive]:

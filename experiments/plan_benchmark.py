@@ -1,10 +1,10 @@
-"""How long the planner's matrices take: ``python -m experiments.plan_benchmark``.
+"""Benchmark of the planner: ``python -m experiments.plan_benchmark``.
 
-Products of 5 to 500 parts, CPU seconds after import and without reading files. "Matrices" is all
-from meshes to C, M_j and their margins, with the overlap check; "contact" is the distances' share
-of it; "again" is the same from the cache, content check included. ``--rule`` adds the orders and
-the general rule, ``--profile`` the functions that take longest, ``--large`` the 500 parts with the
-memory they need. Set OPENBLAS_NUM_THREADS=1 to be strict about one core: a few matrix products may
+Products of 5 to 500 parts, CPU seconds after import and without reading files. "Matrices" is
+everything from meshes to C, M_j and their margins, with the overlap check; "contact" is the share
+of the distances; "cached" is the same read from the cache, with its content check. ``--rule`` adds
+the orders and the general rule, ``--profile`` the functions that take longest, ``--large`` the 500
+parts with their memory. Set OPENBLAS_NUM_THREADS=1 for strictly one core: a few matrix products may
 use more.
 """
 
@@ -30,12 +30,12 @@ from cell.configuration.config import CellConfig
 from cell.products.loading import load_product
 from cell.products.product import Part, Product
 from planning.assembly_plan.planner import plan
-from planning.assembly_plan.rule import general_rule
 from planning.feasibility.cache import cached_matrices
 from planning.feasibility.contact import gap_matrix
 from planning.feasibility.matrices import matrices_of
 from planning.feasibility.solids import solids_of
-from planning.fixture_analysis.candidate import Setup
+from planning.fixture_analysis.candidate import FixtureSetup
+from planning.fixture_analysis.rule import general_rule
 
 STATION = 30.0  # [mm] Pitch of the stations of the bench assemblies.
 
@@ -88,11 +88,10 @@ CASES: dict[str, tuple[Callable[[], Product], float]] = {
     "bench, 25 stations": (lambda: bench(25), 2.0),
     "wavy layers": (freeform, 1.0),
 }
-"""Product and aim in CPU seconds, by name."""
-
+"""Product and target in CPU seconds, by name."""
 
 LARGE = "bench, 125 stations"
-FUNCTIONS = 15  # That a profile lists.
+FUNCTIONS = 15  # Listed in a profile.
 
 
 def main(rule: bool = False, profile: bool = False, large: bool = False) -> None:
@@ -101,20 +100,20 @@ def main(rule: bool = False, profile: bool = False, large: bool = False) -> None
     Args:
         rule: Also time the search for orders and the general rule.
         profile: Also print where the time goes.
-        large: Only the 500 parts, with the memory that they need.
+        large: Only the product of 500 parts.
     """
     cases = {LARGE: (lambda: bench(125), 20.0)} if large else CASES
     table = Table(title="CPU seconds of the planner", title_justify="left")
-    headings = ["product", "parts", "triangles", "contact", "matrices", "aim", "again"]
+    headings = ["product", "parts", "triangles", "contact", "matrices", "target", "cached"]
     for heading in headings + (["orders", "general rule"] if rule else []):
         table.add_column(heading, justify="left" if heading == "product" else "right")
-    for name, (make, aim) in cases.items():
+    for name, (make, target) in cases.items():
         product = make()
         triangles = sum(len(part.mesh.faces) for part in product.parts.values())
         contact, first, again = (f"{seconds:.3f}" for seconds in timed(product))
         further = [f"{seconds:.2f}" for seconds in timed_rule(product)] if rule else []
         count = f"{len(product.parts)}"
-        table.add_row(name, count, f"{triangles}", contact, first, f"{aim:g}", again, *further)
+        table.add_row(name, count, f"{triangles}", contact, first, f"{target:g}", again, *further)
         if profile:
             print(f"{name}:")
             print_profile(product)
@@ -131,20 +130,22 @@ def print_profile(product: Product) -> None:
 
 
 def timed_rule(product: Product) -> tuple[float, float]:
-    """Return CPU seconds for the search of orders, with matrices at hand, and the general rule."""
-    setup = Setup.of(CellConfig.load())
+    """Return CPU seconds for the search of orders, with cached matrices, and the general rule."""
+    config = CellConfig.load()
     with tempfile.TemporaryDirectory() as folder:
         cached_matrices(product, None, Path(folder))
         marks = [time.process_time()]
-        fixing = plan(product, cache=Path(folder))
+        fixing = plan(product, config=config, cache=Path(folder))
+    assert fixing.matrices is not None
     marks.append(time.process_time())
-    general_rule(product, fixing, setup)
+    setup = FixtureSetup.of(config)
+    general_rule(product, fixing.order, fixing.steps, fixing.matrices, setup)
     orders, chosen = np.diff([*marks, time.process_time()])
     return orders, chosen
 
 
 def timed(product: Product) -> tuple[float, float, float]:
-    """Return CPU seconds for distances, for all matrices, and for them from the cache."""
+    """Return CPU seconds for distances, for all matrices, and for reading them from the cache."""
     with tempfile.TemporaryDirectory() as folder:
         marks = [time.process_time()]
         gap_matrix(list(solids_of(product).values()), 7e-5)
@@ -182,7 +183,7 @@ def _layer(level: int, cells: int) -> Manifold:
     """A slab between two wavy surfaces, 12 mm apart, 100 mm square."""
     u = np.linspace(-50, 50, cells + 1)
     x, y = (grid.ravel() for grid in np.meshgrid(u, u, indexing="ij"))
-    low = 12.0 * level + _wave(x, y)
+    low = 12.0 * level + 3.0 * np.sin(x / 9.0) * np.cos(y / 11.0) + 0.02 * x
     vertices = np.concatenate([np.c_[x, y, low], np.c_[x, y, low + 12.0]])
     index = np.arange((cells + 1) ** 2).reshape(cells + 1, cells + 1)
     a, b, c, d = (index[i : i + cells, k : k + cells].ravel() for i in (0, 1) for k in (0, 1))
@@ -193,21 +194,12 @@ def _layer(level: int, cells: int) -> Manifold:
         [np.c_[rim, after, after + above], np.c_[rim, after + above, rim + above]]
     )
     faces = np.concatenate([top + above, top[:, ::-1], walls])
-    mesh = trimesh.Trimesh(vertices, faces, process=False)
-    return _manifold(mesh)
-
-
-def _wave(x: np.ndarray, y: np.ndarray) -> np.ndarray:
-    return 3.0 * np.sin(x / 9.0) * np.cos(y / 11.0) + 0.02 * x
+    return Manifold(Mesh64(vertices, faces.astype(np.uint64)))
 
 
 def _rod(diameter: float, low: float, high: float, facets: int) -> Manifold:
     radius = diameter / 2
     return Manifold.cylinder(high - low, radius, radius, facets).translate([0, 0, low])
-
-
-def _manifold(mesh: trimesh.Trimesh) -> Manifold:
-    return Manifold(Mesh64(np.asarray(mesh.vertices), np.asarray(mesh.faces, np.uint64)))
 
 
 def _product(name: str, shapes: dict[str, Manifold]) -> Product:

@@ -1,4 +1,4 @@
-"""What to do: contact, interference, fixing, grasps, motion; it decides and never simulates."""
+"""What to do: feasibility, fixture analysis, orders, motion; it decides and never simulates."""
 
 from planning.assembly_plan.plan_file import load_plan, save_plan
 from planning.assembly_plan.planner import FixingPlan, plan

@@ -9,8 +9,8 @@ from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_th
 
 from cell.errors import BadPart, CellError
 from cell.products.product import Product
-from planning.feasibility.checks import overlap_depth, without_overlaps
 from planning.feasibility.contact import contact_matrix, gap_matrix, surface_gap
+from planning.feasibility.overlaps import overlap_depth, without_overlaps
 from planning.feasibility.solids import Solid, cog_height, combined_cog, solids_of
 
 TOLERANCE = 5e-5

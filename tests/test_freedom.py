@@ -11,7 +11,7 @@ from tiny_products import box, interlocked_links, peg_in_hole, product_of, rod
 
 from planning import plan
 from planning.feasibility.evidence import evidence_from_dict, evidence_text, evidence_to_dict
-from planning.feasibility.freedom import Freedom, contact_normals, freedoms, motion
+from planning.feasibility.freedom import Freedom, contact_normals, freedom_along, freedoms
 from planning.feasibility.solids import solids_of
 
 TOLERANCE = 5e-5
@@ -43,8 +43,8 @@ def test_a_wedge_leaves_its_groove_along_all_that_the_faces_allow():
     assert (found[:, 2] > -1e-6).all()
 
 
-def test_local_freedom_is_the_room_before_the_hit():
-    """A cube in a box with 5, 3 and 1 mm of room on its sides and no way out."""
+def test_local_freedom_is_the_clearance_ahead():
+    """A cube in a closed box with 5, 3 and 1 mm of clearance on its sides."""
     cage = box((40, 40, 40), (-20, -20, -20)) - box((20, 20, 20), (-10, -10, -10))
     cube = box((12, 14, 19), (-7, -7, -10))
     found = freedoms([solid(cube, "cube")], [solid(cage, "cage")], TOLERANCE)
@@ -66,7 +66,7 @@ def test_removal_to_infinity_agrees_with_the_matrices():
     block, peg = solids_of(peg_in_hole()).values()
     found = freedoms([peg], [block], TOLERANCE)
     np.testing.assert_allclose(leaving(found)[0], [0, 0, 1])
-    assert motion([peg], [block], np.array([0.0, 0, -1]), TOLERANCE).travel == 0.0
+    assert freedom_along([peg], [block], np.array([0.0, 0, -1]), TOLERANCE).travel == 0.0
 
 
 def test_contact_normals_point_out_of_the_target():

@@ -23,7 +23,7 @@ from planning.feasibility.contact import contact_matrix, gap_matrix
 from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
 from planning.feasibility.evidence import evidence_text
 from planning.feasibility.interference import Interference, interference
-from planning.feasibility.matrices import Matrices, matrices_of
+from planning.feasibility.matrices import AssemblyMatrices, matrices_of
 from planning.feasibility.solids import Solid, solids_of
 
 PAPER_TABLE = {
@@ -151,17 +151,17 @@ def test_contact_margin_is_the_distance_of_the_gap_to_the_tolerance(gap):
     assert matrices.contact_margin[0, 1] == pytest.approx(abs(1e-3 * gap - TOLERANCE), abs=1e-9)
 
 
-def test_a_plan_that_hangs_on_the_tolerance_says_so():
+def test_a_plan_that_depends_on_the_tolerance_says_so():
     """The lid rests 0.045 mm above the base: whether they touch decides whether it can be added."""
     low, high = box((20, 20, 20), (0, 0, 0)), box((20, 20, 20), (0, 0, 20.045))
     fixing = plan(product_of({"low": low, "high": high}), ("low", "high"), tolerance=TOLERANCE)
     assert fixing.evidence is not None
     (fragile,) = fixing.evidence.fragile
     assert (fragile.direction, fragile.value, fragile.decides) == ("contact", 1, True)
-    assert "hangs on 0.005 mm of tolerance: low and high touch" in evidence_text(fixing.evidence)
+    assert "depends on 0.005 mm of tolerance: low and high touch" in evidence_text(fixing.evidence)
 
 
-def test_a_plan_with_room_says_nothing():
+def test_a_plan_with_margins_reports_no_fragile_decision():
     evidence = plan(stack_of_three(), ("plate_0", "plate_1", "plate_2")).evidence
     assert evidence is not None and evidence.fragile == ()
     assert evidence_text(evidence) == "Tolerance 0.05 mm, by default."
@@ -278,10 +278,15 @@ def test_half_a_tessellation_is_another_mesh(monkeypatch):
         assert len(coarse.parts[name].mesh.faces) < 0.75 * len(product.parts[name].mesh.faces)
 
 
-def same(a: Matrices, b: Matrices) -> bool:
-    equal = [np.array_equal(a.leaving.free[j], b.leaving.free[j]) for j in DIRECTIONS]
-    equal += [np.array_equal(a.leaving.margin[j], b.leaving.margin[j]) for j in DIRECTIONS]
-    equal += [np.array_equal(a.contact, b.contact), a.leaving.blockers == b.leaving.blockers]
+def same(a: AssemblyMatrices, b: AssemblyMatrices) -> bool:
+    equal = [np.array_equal(a.interference.free[j], b.interference.free[j]) for j in DIRECTIONS]
+    equal += [
+        np.array_equal(a.interference.margin[j], b.interference.margin[j]) for j in DIRECTIONS
+    ]
+    equal += [
+        np.array_equal(a.contact, b.contact),
+        a.interference.blockers == b.interference.blockers,
+    ]
     return all(equal) and a.threads == b.threads and a.tolerance == b.tolerance
 
 

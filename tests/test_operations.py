@@ -5,14 +5,19 @@ from __future__ import annotations
 import ast
 import io
 import tokenize
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import pytest
 
 import planning.operations
-from cell.products.joints import JOINT_TYPES
-from planning.operations.operation import Operation, Role
+from cell.products.joints import JOINT_TYPES, Press
+from cell.products.loading import load_product
+from planning.assembly_plan.planner import plan
+from planning.operations.limits import Limit, failed_checks
+from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.registry import OPERATIONS
+from planning.operations.sequence import steps
 
 FOLDER = Path(planning.operations.__file__).parent
 ROOT = FOLDER.parent.parent
@@ -57,3 +62,34 @@ def test_limits_have_reasons_and_joints_are_of_the_products(operation: Operation
 
 def test_every_role_is_taken() -> None:
     assert {operation.role for operation in OPERATIONS.values()} >= set(Role)
+
+
+def test_operation_that_is_added_takes_the_steps_of_its_joint(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """All it takes is an entry in the registry: here one that presses a plate onto a motor."""
+    product = load_product("motor_unit")
+    press = Press(**asdict(product.fits[0]), force=200.0)
+    pressed = replace(product, joints=(press, *product.screws.values()))
+
+    def offer(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
+        joints = [joint for joint in scene.product.joints if isinstance(joint, Press)]
+        meant = [j for j in joints if parts == (j.hole,) and j.shaft in scene.standing]
+        return Step(f"press {meant[0].hole}", added, parts, meant[0]) if meant else None
+
+    added = Operation(
+        name="press_in",
+        carry_out=lambda station, step: iter(()),
+        measure=lambda cell, record, log: {},
+        limits=(Limit("gap_m", 1e-4, "it is seated"),),
+        role=Role.BRING,
+        joint=Press,
+        plan=offer,
+    )
+    monkeypatch.setitem(OPERATIONS, added.name, added)
+    todo = steps(pressed, plan(pressed, ("motor", "plate", "bolts")))
+    assert [step.name for step in todo] == [
+        "place motor", "press plate", "place bolts", "tighten bolts",
+    ]  # fmt: skip
+    assert [check.quantity for check in failed_checks(todo[1], {})] == ["gap_m"]
+    assert todo[1].fixed_after(pressed, ("motor",)) == ("motor", "plate")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
@@ -18,7 +19,9 @@ from tiny_products import (
     tube_and_pins,
 )
 
+from cell import CellConfig
 from cell.products.loading import load_product
+from cell.products.product import Product
 from planning import plan
 from planning.feasibility.directions import DIRECTIONS
 from planning.ordering.items import Items, items_of
@@ -112,7 +115,7 @@ def test_no_subassembly_leaves_an_inseparable_set(samples):
     assert proved > 5
 
 
-def test_core_does_not_depend_on_what_is_taken_off_first(samples):
+def test_core_does_not_depend_on_what_is_removed_first(samples):
     rng = np.random.default_rng(2)
     for items in samples:
         core = items.everything
@@ -158,7 +161,7 @@ def test_fifty_parts_in_a_tray_with_pins():
     assert time.process_time() - started < 20.0  # 2.2 s; ten times that is a mistake.
 
 
-def test_what_can_come_in_any_order_has_no_precedence():
+def test_parts_in_any_order_have_no_precedence():
     fixing = plan(star(19))
     assert fixing.orders is not None and fixing.orders.precedence == ()
     assert fixing.order[0] == "base" and len(fixing.order) == 20
@@ -264,6 +267,30 @@ def test_a_peg_that_overhangs_is_unstable():
     assert orders is not None
     ranked = {r.order: r.unstable_stages for r in orders.ranked}
     assert ranked[("post", "beam")] == 1
+
+
+def on_a_foot() -> Product:
+    """A plate on an eccentric foot of 10 mm: it is stable once the plate itself lies in the bed."""
+    base = box((10, 10, 10), (-5, -5, 0)) + box((60, 40, 10), (-5, -20, 10))
+    return product_of({"base": base, "lid": box((20, 20, 5), (10, -10, 20))})
+
+
+def configured(**changes: float) -> CellConfig:
+    """The default cell with another press force, or another floor of the bag."""
+    config = CellConfig()
+    if "press_force" in changes:
+        return replace(config, placement=replace(config.placement, **changes))
+    return replace(config, jig=replace(config.jig, bag=replace(config.jig.bag, **changes)))
+
+
+@pytest.mark.parametrize("changes", [{"press_force": 1.0}, {"floor": 0.037}])
+def test_the_search_uses_the_configured_jig_and_press_force(changes):
+    """The plate reaches the bed neither under 1 N nor in a bag of 9 mm: the base is unstable."""
+    default, changed = plan(on_a_foot()), plan(on_a_foot(), config=configured(**changes))
+    assert default.orders is not None and changed.orders is not None
+    assert default.order == ("base", "lid") and changed.order == ("lid", "base")
+    assert [r.unstable_stages for r in default.orders.ranked] == [0, 0]
+    assert [r.unstable_stages for r in changed.orders.ranked] == [1, 2]
 
 
 def test_parts_that_touch_nothing_are_named():

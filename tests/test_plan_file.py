@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from tiny_products import (
 )
 
 import experiments.plan.command as plan_command
+from cell import CellConfig
 from cell.errors import CellError
 from experiments.plan.command import run_plan
 from experiments.plan.options import PlanOptions
@@ -96,6 +98,20 @@ def run(monkeypatch, capsys, product, folder: Path, **options) -> tuple[int, str
     arguments = {"order": None, "options": PlanOptions(), "explain": False} | options
     code = run_plan("tiny", out=folder, **arguments)
     return code, capsys.readouterr().out, load_plan(folder / "plan.json")
+
+
+@pytest.mark.parametrize(("press_force", "unstable"), [(20.0, 0), (1.0, 1)])
+def test_command_plans_for_the_configured_cell(
+    monkeypatch, capsys, tmp_path, press_force, unstable
+):
+    """An eccentric foot of 10 mm: the plate on it is stable only if 20 N press it into the bed."""
+    base = box((10, 10, 10), (-5, -5, 0)) + box((60, 40, 10), (-5, -20, 10))
+    product = product_of({"base": base, "lid": box((20, 20, 5), (10, -10, 20))})
+    config = CellConfig()
+    config = replace(config, placement=replace(config.placement, press_force=press_force))
+    _, _, fixing = run(monkeypatch, capsys, product, tmp_path, config=config)
+    assert fixing.orders is not None
+    assert fixing.orders.ranked[0].unstable_stages == unstable
 
 
 def test_command_writes_and_prints_a_feasible_plan(monkeypatch, capsys, tmp_path):

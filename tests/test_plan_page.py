@@ -27,13 +27,13 @@ from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
 from experiments.reporting.render import rendering_problem
 from planning import plan
-from planning.assembly_plan.rule import general_rule
+from planning.feasibility.bolt_remark import bolt_remarks
 from planning.feasibility.directions import DIRECTIONS
-from planning.feasibility.remark import bolt_remarks
-from planning.fixture_analysis.candidate import Setup
+from planning.fixture_analysis.candidate import FixtureSetup
+from planning.fixture_analysis.rule import general_rule
 
 BAG = BagParameters()
-SETUP = Setup.of(CellConfig())
+SETUP = FixtureSetup.of(CellConfig())
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
 
 
@@ -43,7 +43,9 @@ def boxes_overlap(a: trimesh.Trimesh, b: trimesh.Trimesh) -> bool:
 
 def write(product: Product, file: Path, order: tuple[str, ...] | None = None) -> str:
     fixing = plan(product, order)
-    write_page(file, product, fixing, general_rule(product, fixing, SETUP), SETUP, ["a <note>"])
+    assert fixing.matrices is not None
+    ranking = general_rule(product, fixing.order, fixing.steps, fixing.matrices, SETUP)
+    write_page(file, product, fixing, ranking, SETUP, ["a <note>"])
     return file.read_text()
 
 
@@ -179,9 +181,9 @@ def test_the_papers_remark_on_bolts_depends_on_the_side_of_the_foot():
     """Foot on the motor's side: lower on the heads. On the other: lower with bolts on top."""
     product = load_product("motor_unit")
     for one, holds in ((product, False), (foot_on_the_other_side(product), True)):
-        geometry = plan(one, ("motor", "plate", "bolts")).geometry
-        assert geometry is not None
-        (remark,) = bolt_remarks(one, geometry)
+        matrices = plan(one, ("motor", "plate", "bolts")).matrices
+        assert matrices is not None
+        (remark,) = bolt_remarks(one, matrices.solids)
         assert (remark.part, remark.bolts, remark.holds) == ("plate", 6, holds)
         assert ("does not hold" not in remark.text()) == holds
         print(remark.text())

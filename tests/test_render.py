@@ -96,7 +96,7 @@ def no_cached_probe():
 @pytest.mark.parametrize(
     ("code", "stderr", "reason"),
     [
-        (-11, "", "died with signal 11"),
+        (-11, "", "crashed with signal 11"),
         (1, "Traceback\nRuntimeError: no libEGL", "RuntimeError: no libEGL"),
         (1, "", "failed"),
     ],

@@ -2,7 +2,7 @@
 
 import base64
 import re
-from dataclasses import replace
+from enum import Enum
 from pathlib import Path
 
 import pytest
@@ -10,10 +10,17 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell.builder import add_cell
 from cell.configuration.config import CellConfig
+from cell.fixtures.soft_jig import SoftJig
 from cell.products.loading import load_product
 from cell.simulation.phase import Phase, after
 from cell.simulation.simulation import Simulation
 from experiments.assembly.replay import MEMBRANE_PERIOD, Replay, membrane_path
+
+
+class MadeUp(Enum):
+    """The phase of the test."""
+
+    WAIT = "wait"
 
 
 def test_nothing_wanted_adds_nothing() -> None:
@@ -29,10 +36,12 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     replay, builder = Replay(view=False, file=file), DiagramBuilder()
     cell = add_cell(builder, CellConfig(), load_product("motor_unit"))
     replay.add_to(builder, cell)
-    simulation = Simulation(replace(cell, diagram=builder.Build()))
-    wait = Phase("wait", after(1.5 * MEMBRANE_PERIOD), timeout=1.0)
+    simulation = Simulation(cell.with_diagram(builder.Build()))
+    replay.follow(simulation.root)
+    wait = Phase(MadeUp.WAIT, after(1.5 * MEMBRANE_PERIOD), timeout=1.0)
     simulation.run([wait])
-    cell.soft_jig.bed.heights -= 5e-3
+    assert isinstance(cell.fixture, SoftJig)
+    cell.fixture.memory(simulation.root).bed.heights -= 5e-3
     simulation.run([wait])
     assert replay.meshcat is not None
     assert replay.meshcat.HasPath(membrane_path(cell, "visualizer"))

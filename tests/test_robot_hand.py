@@ -7,9 +7,8 @@ import pytest
 from pydrake.math import RigidTransform
 
 from cell import CellConfig, load_product
-from cell.errors import CellError
 from cell.simulation.phase import PhaseFailed
-from experiments.paper.cases import Case, check_hand, judged
+from experiments.paper.cases import Case, judged
 from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.push_rule import leading, push_line
 from experiments.paper.rig.rig import SLIDE_DRIVE, TURN_DRIVE
@@ -41,7 +40,8 @@ def test_part_lies_still_in_the_tray_within_the_arms_reach(posture: str) -> None
     """As the posture has it turned: on the tray, not in it, and there is a way to grasp it."""
     robot = hand(posture)
     before = robot.observer.X_WP
-    robot.observer.stage.part.wake(robot.observer.root)
+    cell = robot.simulation.cell
+    cell.parts.wake(robot.observer.root, POSTURES[posture].part)
     for _ in range(150):
         robot.simulation.step()
     after = robot.observer.X_WP
@@ -77,7 +77,7 @@ def test_hand_follows_the_line_at_the_speed_of_the_stroke_and_stops_dead() -> No
     robot = hand("motor/P2", "motor/P2/a")
     seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.holder
     X_WP = pose_on_jig(robot.station, "motor", "+z", 0.0, 0.04)
-    line = push_line(seen.stage, PUSHES["motor/P2/a"], seen.X_WJ, X_WP)
+    line = push_line(seen.stage, seen.root, PUSHES["motor/P2/a"], seen.X_WJ, X_WP)
     frame = arm.frame("tip")
     near = [("left_tool", "jig_base")]
     q = robot.station.configuration(arm, frame, line.X_WT, arm.home, near)
@@ -101,7 +101,7 @@ def test_carriage_of_the_rig_is_as_stiff_as_the_arm() -> None:
     robot, chosen = hand("motor/P2", "motor/P2/a"), PUSHES["motor/P2/a"]
     seen, arm = robot.observer, bench("motor/P2", "motor/P2/a").cell.holder
     X_WP = pose_on_jig(robot.station, "motor", "+z", np.pi, 0.04)
-    line = push_line(seen.stage, chosen, seen.X_WJ, X_WP)
+    line = push_line(seen.stage, seen.root, chosen, seen.X_WJ, X_WP)
     near = [("left_tool", "jig_base")]
     q = robot.station.configuration(arm, arm.frame("tip"), line.X_WT, arm.home, near)
     seen.stage.plant.SetPositions(seen.context, arm.instance, q)
@@ -121,12 +121,6 @@ def test_disturbances_are_those_of_the_rig() -> None:
     robot.station.look()
     believed = robot.station.pose_of("motor")
     assert (believed @ draw.X_PDrawn).IsNearlyEqualTo(robot.observer.X_WP, 1e-9)
-
-
-def test_rigid_bed_is_for_the_rig() -> None:
-    check_hand("rig", "rigid")
-    with pytest.raises(CellError, match="--hand rig"):
-        check_hand("robot", "rigid")
 
 
 def test_robot_stands_the_motor_on_the_jig() -> None:

@@ -7,8 +7,8 @@ from types import ModuleType
 import pytest
 
 from experiments import bolt_tightening, operation, pick_place, shaft_insertion
+from experiments.assembly import assemble
 from experiments.assembly.job import Job
-from experiments.cli import single
 from planning.operations.registry import OPERATIONS
 
 SCRIPTS = {
@@ -23,7 +23,7 @@ def test_script_runs_up_to_its_operation(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jobs: list[Job] = []
-    monkeypatch.setattr(single, "run_job", lambda job: jobs.append(job) or 0)
+    monkeypatch.setattr(assemble, "run_job", lambda job: jobs.append(job) or 0)
     script, last = SCRIPTS[name]
     options = ["--seed", "4", "--start", "x.npz", "--quiet", "--out", str(tmp_path / "out")]
     assert script.main([*options, "--set", "placement.press_force=15"]) == 0
@@ -39,7 +39,7 @@ def test_every_operation_has_a_script(
     name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     jobs: list[Job] = []
-    monkeypatch.setattr(single, "run_job", lambda job: jobs.append(job) or 0)
+    monkeypatch.setattr(assemble, "run_job", lambda job: jobs.append(job) or 0)
     assert operation.main([name, "idler", "--quiet", "--out", str(tmp_path / "out")]) == 0
     (job,) = jobs
     assert (job.command, job.last, job.product.name) == (name, OPERATIONS[name], "idler")

@@ -28,7 +28,7 @@ def run_job(job: Job) -> int:
     """
     console = Console(quiet=job.quiet, highlight=False)
     job.product.check_simulable()
-    fixing = plan(job.product, job.order)
+    fixing = plan(job.product, job.order, config=job.config)
     try:
         todo = _steps(job, fixing)
     except NoOperation as reason:

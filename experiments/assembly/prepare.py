@@ -69,7 +69,9 @@ def running_cell(
     cell = add_cell(builder, disturbance.applied_to(config), product)
     if replay is not None:
         replay.add_to(builder, cell)
-    simulation = Simulation(replace(cell, diagram=builder.Build()))
+    simulation = Simulation(cell.with_diagram(builder.Build()))
+    if replay is not None:
+        replay.follow(simulation.root)
     source = TruthSource.of(simulation.cell, simulation.root, seed)
     station = Station(simulation.cell, simulation.root, source, seed, nominal=config)
     return simulation, station, disturbance

@@ -18,10 +18,12 @@ from pydrake.geometry import (
     Rgba,
     Role,
 )
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context, DiagramBuilder, LeafSystem
 
 from cell.builder import Cell
 from cell.errors import UnknownName
+from cell.fixtures.soft_jig import SoftJig
 from cell.fixtures.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
 from cell.fixtures.soft_jig.visual import membrane_shape
 from experiments.reporting.output import write_text
@@ -35,26 +37,34 @@ class MembraneFilm(LeafSystem):
     """Shows the jig's surface each time it has changed.
 
     Args:
-        cell: Whose jig.
+        jig: Whose surface.
+        X_WJ: Where the jig stands.
         meshcat: Where to show it.
         still: Path of the surface that the visualizer shows, to be hidden.
+
+    Attributes:
+        root: Context of the diagram that is shown; None shows nothing yet.
     """
 
-    def __init__(self, cell: Cell, meshcat: Meshcat, still: str) -> None:
+    def __init__(self, jig: SoftJig, X_WJ: RigidTransform, meshcat: Meshcat, still: str) -> None:
         super().__init__()
-        self.cell, self.meshcat, self.still = cell, meshcat, still
+        self.jig, self.X_WJ, self.meshcat, self.still = jig, X_WJ, meshcat, still
+        self.root: Context | None = None
         self.count = 0
         self._shown: np.ndarray | None = None
         self.DeclarePeriodicPublishEvent(MEMBRANE_PERIOD, 0.0, self._publish)
 
     def _publish(self, context: Context) -> None:
-        surface = self.cell.soft_jig.bed.heights
-        if self._shown is not None and np.array_equal(surface, self._shown):
+        if self.root is None:
             return
-        self._shown = surface.copy()
-        path, time = f"/membrane/{self.count}", context.get_time()
-        self.meshcat.SetObject(path, membrane_shape(self.cell.soft_jig.bed), Rgba(*SILICONE_COLOR))
-        self.meshcat.SetTransform(path, self.cell.X_WJ)
+        bed = self.jig.memory(self.root).bed
+        if self._shown is not None and np.array_equal(bed.heights, self._shown):
+            return
+        self._shown = bed.heights.copy()
+        # The first is there from the start: it was found at the first step.
+        path, time = f"/membrane/{self.count}", context.get_time() if self.count else 0.0
+        self.meshcat.SetObject(path, membrane_shape(bed), Rgba(*SILICONE_COLOR))
+        self.meshcat.SetTransform(path, self.X_WJ)
         if self.count:
             self.meshcat.SetProperty(path, "visible", False, 0.0)
             self.meshcat.SetProperty(f"/membrane/{self.count - 1}", "visible", False, time)
@@ -76,6 +86,7 @@ class Replay:
         self.view, self.file = view, file
         logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat reports its port.
         self.meshcat = Meshcat(MeshcatParams(show_stats_plot=False)) if view or file else None
+        self.film: MembraneFilm | None = None
 
     @property
     def url(self) -> str | None:
@@ -88,13 +99,20 @@ class Replay:
             return
         params = MeshcatVisualizerParams(publish_period=FRAME_PERIOD)
         MeshcatVisualizer.AddToBuilder(builder, cell.scene_graph, self.meshcat, params)
-        still = membrane_path(cell, params.prefix)
-        builder.AddSystem(MembraneFilm(cell, self.meshcat, still))
+        if isinstance(cell.fixture, SoftJig):
+            still = membrane_path(cell, params.prefix)
+            film = MembraneFilm(cell.fixture, cell.X_WJ, self.meshcat, still)
+            self.film = builder.AddSystem(film)
         self.meshcat.SetCameraPose(*CAMERA)
         if self.file is not None:
             self.meshcat.StartRecording(
                 frames_per_second=1.0 / FRAME_PERIOD, set_visualizations_while_recording=self.view
             )
+
+    def follow(self, root: Context) -> None:
+        """Show the jig as it is in a Context of the built diagram."""
+        if self.film is not None:
+            self.film.root = root
 
     def save(self) -> None:
         """Write the recording, if one is wanted."""

@@ -120,7 +120,7 @@ class RobotBench:
         """Put part and jig in their places, the arms at home."""
         simulation = Simulation(self.cell)
         X_WJ = disturbance.displaced(self.cell.X_WJ)
-        self.cell.jig_base.reset(simulation.root, X_WJ)
+        self.cell.jig_base.set_down(simulation.root, X_WJ)
         truth = TruthSource.of(self.cell, simulation.root, disturbance.seed)
         source = DrawnSource(truth, disturbance.X_PDrawn.inverse(), self.posture.grasp)
         station = Station(self.cell, simulation.root, source, seed=disturbance.seed)
@@ -135,10 +135,10 @@ def _stage(cell: Cell, part: str) -> Stage:
         plant=cell.plant,
         scene_graph=cell.scene_graph,
         jig_base=cell.jig_base,
-        soft_jig=cell.fixture,
+        fixture=cell.fixture,
         part=cell.parts[part],
-        samples=SurfaceSamples.of(part, cell.product.parts[part].mesh),
-        gripper=cell.holder.tool,
+        surface=SurfaceSamples.of(part, cell.product.parts[part].mesh).points,
+        gripper=cell.gripper,
         wrist=cell.holder.wrist,
         force_plate=cell.force_plate,
     )
@@ -229,7 +229,7 @@ class RobotHand:
         """Return whether the arm can push the part where it will stand."""
         bench = self._bench
         assert bench.push is not None
-        line = push_line(bench.stage, bench.push, bench.cell.X_WJ, X_WP)
+        line = push_line(bench.stage, self.simulation.root, bench.push, bench.cell.X_WJ, X_WP)
         return can_push(self.station, self._name, line)
 
 

@@ -1,24 +1,23 @@
-"""Where the parts are in a picture: on the jig before a step, or drawn apart."""
+"""Arrangement of the parts in a picture: on the jig before a step, or as an exploded view."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 import trimesh
 
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.product import Product
-from experiments.plan.scene import Color, Shown
+from experiments.plan.scene import Color, SceneItem
 from planning.feasibility.algorithm import FixingStep
-from planning.feasibility.directions import opposite, unit_vector
-from planning.fixture_analysis.footprint import posture
+from planning.feasibility.directions import opposite, rotation_with_up, unit_vector
 
 MOVED: Color = (0.93, 0.52, 0.13)
 ARROW: Color = (0.80, 0.10, 0.12)
 BAG: Color = (0.16, 0.33, 0.30)
 BASE: Color = (0.42, 0.44, 0.47)
-PARTS: tuple[Color, ...] = (  # Muted, told apart also without red and green.
+PARTS: tuple[Color, ...] = (  # Muted, and distinguishable with red-green colour blindness.
     (0.62, 0.66, 0.72),
     (0.36, 0.52, 0.72),
     (0.80, 0.72, 0.45),
@@ -27,51 +26,55 @@ PARTS: tuple[Color, ...] = (  # Muted, told apart also without red and green.
     (0.70, 0.55, 0.52),
 )
 MOST_LABELS = 14  # More would cover the picture.
-GAP = 0.35  # Of the size of what moves, between the parts in a picture.
+GAP = 0.35  # Of the size of the moved parts, between the parts in a picture.
 
 
 def step_arrangement(
     product: Product, step: FixingStep, bag: BagParameters, depth: float
-) -> list[Shown]:
-    """Return the product in its posture on the jig, and what comes in with the mating arrow.
+) -> list[SceneItem]:
+    """Return the product in its posture on the jig, and the moved parts with the mating arrow.
 
     Args:
         product: Its parts.
         step: Algorithm 1's choice.
         bag: Of the jig.
-        depth: How deep the fixed body is pressed in below the bag's apex [m].
+        depth: Of the fixed body's lowest point below the bag's apex [m].
     """
     turned = {n: _turned(product, n, step.up) for n in (*step.target, *step.incoming)}
     below = step.incoming if step.posture == opposite(step.up) else step.target
     moved = step.target if below is step.incoming else step.incoming
-    leaving = posture(step.up) @ unit_vector(
+    leaving = rotation_with_up(step.up) @ unit_vector(
         step.posture if moved is step.incoming else opposite(step.posture)
     )
-    _on_the_bag(turned, below, bag, depth)
-    start = _apart([turned[n] for n in moved], [turned[n] for n in below], leaving)
+    low, high = _box([turned[name] for name in below])
+    middle = (low + high) / 2
+    to_bag = np.array([-middle[0], -middle[1], bag.cap_height - depth - low[2]])
+    for mesh in turned.values():
+        mesh.apply_translation(to_bag)
+    start = _separation([turned[n] for n in moved], [turned[n] for n in below], leaving)
     for name in moved:
         turned[name].apply_translation(start * leaving)
-    shown = [Shown(bag_mesh(bag), BAG, frame=False), Shown(base_mesh(bag), BASE, frame=False)]
+    shown = [
+        SceneItem(bag_mesh(bag), BAG, frame=False),
+        SceneItem(base_mesh(bag), BASE, frame=False),
+    ]
     shown += _parts(product, turned, moved)
-    return [*shown, Shown(arrow([turned[n] for n in moved], -leaving), ARROW)]
+    return [*shown, SceneItem(arrow([turned[n] for n in moved], -leaving), ARROW)]
 
 
-def exploded(product: Product, steps: Sequence[FixingStep]) -> list[Shown]:
-    """Return the product drawn apart: each item moved out the way it came in."""
-    turned = {n: _turned(product, n, steps[0].up) for n in (*steps[0].target, *_incoming(steps))}
-    there = list(steps[0].target)
+def exploded(product: Product, steps: Sequence[FixingStep]) -> list[SceneItem]:
+    """Return an exploded view: each item moved out against its mating direction."""
+    assembled = list(steps[0].target)
+    names = [*assembled, *(name for step in steps for name in step.incoming)]
+    turned = {name: _turned(product, name, steps[0].up) for name in names}
     for step in steps:
-        leaving = posture(step.up) @ unit_vector(step.posture)
+        leaving = rotation_with_up(step.up) @ unit_vector(step.posture)
         moved = [turned[name] for name in step.incoming]
-        distance = _apart(moved, [turned[name] for name in there], leaving)
+        distance = _separation(moved, [turned[name] for name in assembled], leaving)
         for mesh in moved:
             mesh.apply_translation(distance * leaving)
-        there += step.incoming
+        assembled += step.incoming
     return _parts(product, turned, ())
-
-
-def _incoming(steps: Sequence[FixingStep]) -> list[str]:
-    return [name for step in steps for name in step.incoming]
 
 
 def _turned(product: Product, name: str, up: str) -> trimesh.Trimesh:
@@ -80,25 +83,14 @@ def _turned(product: Product, name: str, up: str) -> trimesh.Trimesh:
     mesh = trimesh.Trimesh(part.mesh.vertices, part.mesh.faces, process=False)
     mesh.apply_transform(part.X_AP.GetAsMatrix4())
     turn = np.eye(4)
-    turn[:3, :3] = posture(up)
+    turn[:3, :3] = rotation_with_up(up).matrix()
     return mesh.apply_transform(turn)
 
 
-def _on_the_bag(
-    turned: dict[str, trimesh.Trimesh], below: Iterable[str], bag: BagParameters, depth: float
-) -> None:
-    """Move everything so that the body below stands pressed into the middle of the bag."""
-    low, high = _box([turned[name] for name in below])
-    middle = (low + high) / 2
-    to_bag = np.array([-middle[0], -middle[1], bag.cap_height - depth - low[2]])
-    for mesh in turned.values():
-        mesh.apply_translation(to_bag)
-
-
-def _apart(
+def _separation(
     moved: Sequence[trimesh.Trimesh], staying: Sequence[trimesh.Trimesh], along: np.ndarray
 ) -> float:
-    """Return how far to move along a direction until there is a gap [m]."""
+    """Return the distance to move along a direction until there is a gap [m]."""
     (low, high), (low_there, high_there) = _box(moved), _box(staying)
     axis, forward = int(np.argmax(np.abs(along))), along.sum() > 0
     overlap = high_there[axis] - low[axis] if forward else high[axis] - low_there[axis]
@@ -112,23 +104,19 @@ def _box(meshes: Sequence[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
 
 def _parts(
     product: Product, turned: dict[str, trimesh.Trimesh], moved: Sequence[str]
-) -> list[Shown]:
-    """Return parts, one colour per item; of a group the first is labelled, for all."""
-    labels = _label_names(product, turned)
-    place = {n: k for k, item in enumerate(product.items()) for n in product.members(item)}
-    return [
-        Shown(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
-        for name, mesh in turned.items()
-    ]
-
-
-def _label_names(product: Product, names: Iterable[str]) -> dict[str, str]:
-    labels = {name: name for name in names}
+) -> list[SceneItem]:
+    """Return parts in one colour per item; the first part of a group has the group's label."""
+    labels = {name: name for name in turned}
     for group, members in product.groups.items():
         for number, name in enumerate(name for name in members if name in labels):
             labels[name] = "" if number else group
-    named = [name for name, text in labels.items() if text]
-    return labels | dict.fromkeys(named[MOST_LABELS:], "")
+    labelled = [name for name, text in labels.items() if text]
+    labels |= dict.fromkeys(labelled[MOST_LABELS:], "")
+    place = {n: k for k, item in enumerate(product.items()) for n in product.members(item)}
+    return [
+        SceneItem(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
+        for name, mesh in turned.items()
+    ]
 
 
 def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trimesh:
@@ -138,7 +126,7 @@ def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trime
     length, radius = max(0.6 * size, 0.015), max(0.02 * size, 0.0008)
     shaft = trimesh.creation.cylinder(radius, 0.65 * length, sections=24)
     shaft.apply_translation([0, 0, 0.325 * length])
-    # So few facets are shaded one by one; smooth, the point would be black as if it faced away.
+    # Few facets, so that each has its own normal: smoothed normals would shade the tip black.
     tip = trimesh.creation.cone(2.5 * radius, 0.35 * length, sections=8)
     tip.apply_translation([0, 0, 0.65 * length])
     whole = trimesh.util.concatenate([shaft, tip])
@@ -151,7 +139,7 @@ def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trime
 
 
 def bag_mesh(bag: BagParameters) -> trimesh.Trimesh:
-    """Return the bag at rest: a spherical cap on z = 0."""
+    """Return the undisturbed bag: a spherical cap on z = 0."""
     angles = np.linspace(0.0, np.arcsin(bag.aperture_radius / bag.cap_radius), 24)
     if bag.cap_height > bag.cap_radius:
         angles = np.linspace(0.0, np.pi - angles[-1], 24)

@@ -11,22 +11,20 @@ from rich.console import Console
 
 from cell.configuration.config import CellConfig
 from cell.products.loading import load_product
-from cell.products.product import Product
 from experiments.plan.options import PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
-from planning.assembly_plan.choice_file import choices_text, choices_to_list
 from planning.assembly_plan.explain import explanation, step_table, step_texts, stop_text
 from planning.assembly_plan.plan_file import save_plan
 from planning.assembly_plan.planner import FixingPlan, plan
-from planning.assembly_plan.rule import general_rule
+from planning.feasibility.bolt_remark import bolt_remarks
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence import evidence_text
-from planning.feasibility.remark import bolt_remarks
-from planning.fixture_analysis.candidate import Choice, Setup
-from planning.ordering.explain import advice_text
+from planning.fixture_analysis.candidate import Choice, FixtureSetup
+from planning.fixture_analysis.rule import choices_text, choices_to_list, general_rule
+from planning.ordering.advice_format import advice_text
 
-MIN_WIDTH = 100  # Characters: the step table with names of ordinary length, also into a file.
+MIN_WIDTH = 100  # Characters: enough for the step table, also if the output is not a terminal.
 
 
 def run_plan(
@@ -42,55 +40,58 @@ def run_plan(
     """Plan a product, print the plan, and write ``plan.json`` and ``matrices.npz``.
 
     Args:
-        product: A name in ``models/products``, or what else ``load_product`` reads.
+        product: A name in ``models/products``, or anything else that ``load_product`` reads.
         order: Parts or groups in the order of assembly, or None for the product's default.
         options: How the product is read and planned.
-        explain: Whether to print matrices, reasons, candidates and evidence as well.
+        explain: Whether to print matrices, reasons and candidates as well.
         out: Folder for the files; made if missing.
-        config: The cell that the general rule reckons with; None for the default.
-        html: Whether to write ``plan.html``, too.
+        config: The cell, for the search of orders and the general rule; None for the default.
+        html: Whether to write ``plan.html`` as well.
 
     Returns:
         0 if the order is feasible, 1 if it is well formed but infeasible.
 
     Raises:
-        CellError: The product or the order cannot be used; nothing is written.
+        InputError: The product or the order cannot be used; nothing is written.
     """
-    described = _described(product, options)
-    console = _console()
+    described = load_product(
+        product, options.units, densities=options.densities, group=options.group
+    )
+    if options.up:
+        described = replace(described, up=options.up)
+    config = config or CellConfig()
+    console = Console(highlight=False)
+    console.width = max(console.width, MIN_WIDTH)
     with console.status("Matrices, steps and orders ..."):
         fixing = plan(
             described,
             order,
+            config=config,
             tolerance=options.tolerance,
             cache=options.cache,
             slanted=options.slanted,
         )
-    assert fixing.geometry is not None
+    assert fixing.matrices is not None
     _print_plan(console, fixing, explain)
-    setup, started = Setup.of(config or CellConfig()), time.perf_counter()
-    with console.status("Ways to hold it, by the general rule ..."):
-        choices = general_rule(described, fixing, setup)
+    setup, started = FixtureSetup.of(config), time.perf_counter()
+    with console.status("Candidates of the general rule ..."):
+        choices = general_rule(described, fixing.order, fixing.steps, fixing.matrices, setup)
     seconds = {"general rule": time.perf_counter() - started}
-    remarks = [remark.text() for remark in bolt_remarks(described, fixing.geometry)]
+    remarks = [remark.text() for remark in bolt_remarks(described, fixing.matrices.solids)]
     out.mkdir(parents=True, exist_ok=True)
     page = out / "plan.html"
-    page.unlink(missing_ok=True)  # An earlier plan's page is not this one's.
+    page.unlink(missing_ok=True)  # A page of an earlier plan would not match.
     save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
     save_matrices(fixing, out / "matrices.npz")
     if html:
         with console.status(f"Pictures for {page.name} ..."):
             seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
     _print_rule(console, choices, explain, remarks)
-    _print_times(console, fixing, seconds)
+    if fixing.orders:
+        seconds = {"orders": fixing.orders.seconds} | seconds
+    further = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
+    _print_lines(console, [f"Planned in {fixing.seconds:.2f} s; {further}."])
     return 0 if fixing.feasible else 1
-
-
-def _described(product: str, options: PlanOptions) -> Product:
-    described = load_product(
-        product, options.units, densities=options.densities, group=options.group
-    )
-    return replace(described, up=options.up) if options.up else described
 
 
 def save_matrices(fixing: FixingPlan, file: Path) -> None:
@@ -103,12 +104,6 @@ def save_matrices(fixing: FixingPlan, file: Path) -> None:
         "reachable": np.stack([fixing.reachable[j] for j in DIRECTIONS]),
     }
     write_arrays(file, arrays)
-
-
-def _console() -> Console:
-    console = Console(highlight=False)
-    console.width = max(console.width, MIN_WIDTH)
-    return console
 
 
 def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
@@ -128,13 +123,6 @@ def _print_rule(
     else:
         lines = [f"{choice.item}: {choice.verdict}" for choice in choices if not choice.agrees]
     _print_lines(console, lines + remarks)
-
-
-def _print_times(console: Console, fixing: FixingPlan, seconds: dict[str, float]) -> None:
-    if fixing.orders:
-        seconds = {"orders": fixing.orders.seconds} | seconds
-    apart = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
-    _print_lines(console, [f"Planned in {fixing.seconds:.2f} s; {apart}."])
 
 
 def _print_lines(console: Console, lines: list[str]) -> None:

@@ -1,4 +1,4 @@
-"""The planner's matrices as pictures, with the names of the parts."""
+"""Heat maps of the planner's matrices, labelled with the names of the parts."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def contact_map(parts: Sequence[str], contact: np.ndarray) -> bytes:
 
 
 def direction_maps(parts: Sequence[str], matrices: Mapping[str, np.ndarray], symbol: str) -> bytes:
-    """Return the six matrices of a kind as one PNG, two in each column of a direction's axis."""
+    """Return the six matrices of a kind as one PNG: a column per axis, a row per sign."""
     width = 2.4 * _size(parts) + 0.6
     height = min(1.7 * _size(parts), 9.0)
     figure = Figure(figsize=(min(width, 13.0), height), dpi=DPI, layout="constrained")
@@ -43,7 +43,7 @@ def direction_maps(parts: Sequence[str], matrices: Mapping[str, np.ndarray], sym
 def _draw(
     axes: Axes, parts: Sequence[str], matrix: np.ndarray, title: str, cell: float, named: bool
 ) -> None:
-    """Draw a matrix of 0 and 1; the names fit to its cells, so large [inch]."""
+    """Draw a matrix of 0 and 1; the size of the names follows that of a cell [inch]."""
     cells = np.array(matrix, int)
     np.fill_diagonal(cells, 2)
     axes.imshow(cells, cmap=COLORS, vmin=0, vmax=2, interpolation="nearest")

@@ -1,4 +1,4 @@
-"""How ``soft-jig plan`` reads and plans a product, where that is not the default."""
+"""Options of ``soft-jig plan``, apart from the command so that parsing them imports little."""
 
 from __future__ import annotations
 
@@ -9,15 +9,15 @@ from pathlib import Path
 
 @dataclass(frozen=True)
 class PlanOptions:
-    """How a product is read and planned, where that is not the default.
+    """How a product is read and planned; the defaults are those of the command.
 
     Attributes:
         units: Length unit of a folder's meshes.
-        densities: Densities of parts by name [kg/m3]; "" for the rest.
+        densities: Densities of parts by name [kg/m3]; "" for all others.
         group: Whether identical parts form groups.
-        tolerance: Gap that still touches, and overlap that does not block [m].
-        cache: Folder in which matrices are kept by content.
-        slanted: Whether to look for ways out at an angle and for local freedom.
+        tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
+        cache: Folder of the matrix cache; None for no cache.
+        slanted: Whether to search for slanted removal directions and local freedom.
         up: Axis that points up on the jig, "+x" ... "-z"; None for the product's.
     """
 

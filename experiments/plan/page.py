@@ -1,17 +1,16 @@
-"""``plan.html``: the whole plan on one page that works offline."""
+"""``plan.html``: the whole plan on one self-contained page."""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from html import escape
 from pathlib import Path
-from typing import Any
 
 from cell.products.product import Product
 from experiments.plan.arrangement import exploded, step_arrangement
 from experiments.plan.heatmaps import contact_map, direction_maps
-from experiments.plan.scene import Shown, figure, picture
+from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import figures, page, pairs, section, table
 from experiments.reporting.output import write_text
 from experiments.reporting.render import rendering_problem
@@ -20,11 +19,11 @@ from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import opposite
 from planning.feasibility.evidence import evidence_text
-from planning.feasibility.order import together
-from planning.fixture_analysis.candidate import CRITERIA, Candidate, Choice, Setup
+from planning.feasibility.order import subassembly_name
+from planning.fixture_analysis.candidate import CRITERIA, Choice, FixtureSetup
 from planning.fixture_analysis.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
-from planning.ordering.explain import advice_text, arrow_text
+from planning.ordering.advice_format import advice_text, constraint_text
 
 MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
 MOST_BLOCKERS = 400
@@ -35,30 +34,35 @@ def write_page(
     product: Product,
     plan: FixingPlan,
     choices: Sequence[Choice],
-    setup: Setup,
+    setup: FixtureSetup,
     notes: Sequence[str] = (),
 ) -> float:
-    """Write the page; return the time it took [s].
+    """Write the page; return the time taken [s].
 
     Args:
         path: The HTML file; it appears whole or not at all.
         product: What was planned.
         plan: Its plan.
-        choices: What the general rule says, per step.
-        setup: The cell.
-        notes: What the reader has to know besides.
+        choices: The general rule's ranking, per step.
+        setup: The cell's jig.
+        notes: Further remarks for the reader.
     """
     started = time.perf_counter()
     problem = rendering_problem()
+    evidence = evidence_text(plan.evidence) if plan.evidence else ""
+    apart = ""
+    if plan.steps and problem is None:
+        shown = exploded(product, plan.steps)
+        apart = _figure(shown, "Each item moved out against its mating direction")
     missing = [f"No pictures: {problem}."] if problem else []
     sections = [
         _summary(plan, [*notes, *missing]),
         section("Orders", _orders(plan.orders)),
         section("Steps", _steps(product, plan, choices, setup, pictured=problem is None)),
-        section("Exploded view", "" if problem else _exploded(product, plan)),
+        section("Exploded view", apart),
         section("Matrices", _matrices(plan)),
-        section("What the matrices rest on", _evidence(plan)),
-        section("What blocks what", _blockers(plan)),
+        section("Evidence", f"<pre>{escape(evidence)}</pre>" if evidence else ""),
+        section("Blocked motions", _blockers(plan)),
     ]
     body = "\n".join(filter(None, sections))
     write_text(path, page(f"{plan.product}: plan", body))
@@ -89,13 +93,17 @@ def _orders(advice: OrderAdvice | None) -> str:
     if not advice.ranked:
         return text
     first = escape(advice.ranked[0].order[0])
-    arrows = "".join(f"<li>{escape(arrow_text(arrow))}</li>" for arrow in advice.precedence)
-    listed = f"<ul>{arrows}</ul>" if arrows else "<p>None.</p>"
+    lines = "".join(f"<li>{escape(constraint_text(one))}</li>" for one in advice.precedence)
+    listed = f"<ul>{lines}</ul>" if lines else "<p>None.</p>"
     return f"{text}<h3>Precedence, in every order that begins with {first}</h3>{listed}"
 
 
 def _steps(
-    product: Product, plan: FixingPlan, choices: Sequence[Choice], setup: Setup, pictured: bool
+    product: Product,
+    plan: FixingPlan,
+    choices: Sequence[Choice],
+    setup: FixtureSetup,
+    pictured: bool,
 ) -> str:
     scores = f"<details><summary>What the scores mean</summary>{pairs(CRITERIA)}</details>"
     parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
@@ -116,88 +124,71 @@ def _steps(
 
 
 def _picture(
-    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: Setup
+    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: FixtureSetup
 ) -> str:
     step = plan.steps[number]
     figured = choice.candidates[choice.paper].figures if choice else {}
     depth = figured.get("depth_m", USUAL_DEPTH)
     shown = step_arrangement(product, step, setup.jig.bag, depth)
-    sides = [step.item, together(plan.order[: number + 1])]
+    sides = [step.item, subassembly_name(plan.order[: number + 1])]
     moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
     return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
 
 
-def _exploded(product: Product, plan: FixingPlan) -> str:
-    return (
-        _figure(exploded(product, plan.steps), "Each item moved out the way it comes in")
-        if plan.steps
-        else ""
-    )
-
-
-def _figure(shown: Sequence[Shown], caption: str) -> str:
+def _figure(shown: Sequence[SceneItem], caption: str) -> str:
     png, view = picture(shown)
     return figure(png, view, shown, caption)
 
 
 def _choice(choice: Choice) -> str:
-    passed = [_row(number, c, choice) for number, c in enumerate(choice.candidates, start=1)
-              if not c.rejected]  # fmt: skip
-    rejected = [c for c in choice.candidates if c.rejected]
-    notes = [(c, note) for c in choice.candidates for note in c.notes]
+    """Return the general rule's ranking: a table of the scores, notes, and the rejected ones."""
+    rows: list[dict[str, str]] = []
+    notes, rejected = [], []
+    for number, candidate in enumerate(choice.candidates):
+        mark = " (Algorithm 1)" if number == choice.paper else ""
+        notes += [(candidate.label + mark, note) for note in candidate.notes]
+        if candidate.rejected:
+            rejected.append((candidate.label + mark, candidate.rejected))
+            continue
+        figures = candidate.figures
+        rows.append(
+            {
+                "": f"{number + 1}",
+                "on the jig": candidate.name + mark,
+                "up": candidate.up,
+                "from": candidate.approach.removeprefix("the "),
+                "score": f"{candidate.score:.2f}",
+                **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
+                "withstands / operation sideways [N]": (
+                    f"{figures['bears_across_N']:.1f} / {figures['pushed_across_N']:.1f}"
+                ),
+            }
+        )
     kind = "agree" if choice.agrees else "differ"
     return (
         f'<p class="{kind}"><b>General rule:</b> {escape(choice.verdict)}</p>'
-        f"{table(passed, list(passed[0])) if passed else ''}"
-        f"{_about(choice, notes)}<details><summary>{len(rejected)} rejected</summary>"
-        f"{_about(choice, [(c, c.rejected) for c in rejected])}</details>"
+        f"{table(rows, list(rows[0])) if rows else ''}"
+        f"{_listed(notes)}<details><summary>{len(rejected)} rejected</summary>"
+        f"{_listed(rejected)}</details>"
     )
 
 
-def _about(choice: Choice, remarks: Sequence[tuple[Candidate, str]]) -> str:
-    lines = "".join(
-        f"<li>{escape(c.label + _by_paper(choice, c))}: {escape(text)}</li>" for c, text in remarks
-    )
+def _listed(remarks: Sequence[tuple[str, str]]) -> str:
+    lines = "".join(f"<li>{escape(what)}: {escape(text)}</li>" for what, text in remarks)
     return f"<ul>{lines}</ul>" if lines else ""
 
 
-def _row(number: int, candidate: Candidate, choice: Choice) -> Mapping[str, Any]:
-    return {
-        "": number,
-        "on the jig": candidate.name + _by_paper(choice, candidate),
-        "up": candidate.up,
-        "from": candidate.approach.removeprefix("the "),
-        "score": f"{candidate.score:.2f}",
-        **{name: f"{value:.2f}" for name, value in candidate.scores.items()},
-        "bears / pushed across [N]": (
-            f"{candidate.figures['bears_across_N']:.1f} / "
-            f"{candidate.figures['pushed_across_N']:.1f}"
-        ),
-    }
-
-
-def _by_paper(choice: Choice, candidate: Candidate) -> str:
-    return " (Algorithm 1)" if candidate is choice.candidates[choice.paper] else ""
-
-
 def _matrices(plan: FixingPlan) -> str:
+    contact = contact_map(plan.parts, plan.contact)
+    free = direction_maps(plan.parts, plan.free, "M")
+    reachable = direction_maps(plan.parts, plan.reachable, "W")
     return figures(
         [
-            ("C: blue where two parts touch", contact_map(plan.parts, plan.contact)),
-            (
-                "M: blue where the row's part leaves the column's part along the direction",
-                direction_maps(plan.parts, plan.free, "M"),
-            ),
-            (
-                "W: blue where they touch as well, so that the row's part can be mated that way",
-                direction_maps(plan.parts, plan.reachable, "W"),
-            ),
+            ("C: blue where two parts touch", contact),
+            ("M: blue where the row's part leaves the column's part along the direction", free),
+            ("W: blue where they also touch: the row's part can be mated along it", reachable),
         ]
     )
-
-
-def _evidence(plan: FixingPlan) -> str:
-    return f"<pre>{escape(evidence_text(plan.evidence))}</pre>" if plan.evidence else ""
 
 
 def _blockers(plan: FixingPlan) -> str:

@@ -1,4 +1,4 @@
-"""Pictures of parts that nothing moves: meshes in a scene, a camera that sees them all, labels."""
+"""Static pictures of parts: meshes in a scene, a camera that frames them, labels."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from cell.products.mesh_io import obj_text
 from experiments.reporting.render import View, take_picture
 
 FIELD_OF_VIEW = 24.0  # [deg] Narrow: parallel edges look parallel.
-TOWARDS = np.array([1.0, 1.7, 0.9])  # From what is seen to the camera.
+TOWARDS = np.array([1.0, 1.7, 0.9])  # From the scene to the camera.
 WIDTH, HEIGHT = 760, 560
 LABEL_HEIGHT = 20
 
@@ -33,14 +33,14 @@ Color = tuple[float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
-class Shown:
+class SceneItem:
     """One mesh in a picture.
 
     Attributes:
         mesh: In W [m].
         color: Red, green, blue from 0 to 1.
-        name: For its label; "" for none.
-        frame: Whether the camera must see all of it.
+        name: Text of its label; "" for none.
+        frame: Whether the camera must frame all of it.
     """
 
     mesh: trimesh.Trimesh
@@ -49,36 +49,31 @@ class Shown:
     frame: bool = True
 
 
-def picture(shown: Sequence[Shown]) -> tuple[bytes, View]:
+def picture(shown: Sequence[SceneItem]) -> tuple[bytes, View]:
     """Return a PNG of meshes, and the camera it was taken with.
 
     Raises:
-        NoRendering: Where this machine cannot render.
+        NoRendering: This machine cannot render.
     """
     builder = DiagramBuilder()
     scene_graph = builder.AddSystem(SceneGraph())
     source = scene_graph.RegisterSource("picture")
     for number, item in enumerate(shown):
-        scene_graph.RegisterAnchoredGeometry(source, _geometry(item, number))
+        file = MemoryFile(obj_text(item.mesh, normals=True), ".obj", f"part {number}")
+        mesh = Mesh(InMemoryMesh(mesh_file=file))
+        geometry = GeometryInstance(RigidTransform(), mesh, f"part {number}")
+        properties = PerceptionProperties()
+        properties.AddProperty("phong", "diffuse", Rgba(*item.color, 1.0))
+        geometry.set_perception_properties(properties)
+        scene_graph.RegisterAnchoredGeometry(source, geometry)
     diagram = builder.Build()
     view = view_of(item.mesh for item in shown if item.frame)
     context = diagram.CreateDefaultContext()
     return take_picture(scene_graph, context, view, shadows=False), view
 
 
-def _geometry(item: Shown, number: int) -> GeometryInstance:
-    file = MemoryFile(obj_text(item.mesh, normals=True), ".obj", f"part {number}")
-    geometry = GeometryInstance(
-        RigidTransform(), Mesh(InMemoryMesh(mesh_file=file)), f"part {number}"
-    )
-    properties = PerceptionProperties()
-    properties.AddProperty("phong", "diffuse", Rgba(*item.color, 1.0))
-    geometry.set_perception_properties(properties)
-    return geometry
-
-
 def view_of(meshes: Iterable[trimesh.Trimesh]) -> View:
-    """Return a camera that sees all of some meshes, from the front and above."""
+    """Return a camera that frames meshes, from the front and above."""
     points = np.concatenate([mesh.bounds for mesh in meshes])
     low, high = points.min(axis=0), points.max(axis=0)
     centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
@@ -93,8 +88,8 @@ def view_of(meshes: Iterable[trimesh.Trimesh]) -> View:
     )
 
 
-def figure(png: bytes, view: View, shown: Sequence[Shown], caption: str) -> str:
-    """Return a picture with its labels as HTML: text stays text at every size."""
+def figure(png: bytes, view: View, shown: Sequence[SceneItem], caption: str) -> str:
+    """Return a picture with its labels as HTML; the labels are SVG text, legible at every size."""
     labels = _labels(view, [item for item in shown if item.name])
     image = (
         f'<image width="{view.width}" height="{view.height}" '
@@ -107,8 +102,8 @@ def figure(png: bytes, view: View, shown: Sequence[Shown], caption: str) -> str:
     )
 
 
-def _labels(view: View, named: Sequence[Shown]) -> str:
-    """Return the names at the right edge, below each other, with a line to each part."""
+def _labels(view: View, named: Sequence[SceneItem]) -> str:
+    """Return the names in a column at the right edge, with a line to each part."""
     at = [projected(view, item.mesh.bounds.mean(axis=0)) for item in named]
     order = sorted(range(len(named)), key=lambda k: at[k][1])
     lines, y = [], 0.0

@@ -1,4 +1,1 @@
-"""What every room writes with: whole files, HTML pages, plots, pictures without a display.
-
-It imports no other room.
-"""
+"""Output shared by all experiments: files, HTML pages, plots, pictures without a display."""

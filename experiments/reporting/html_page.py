@@ -1,4 +1,4 @@
-"""The pieces that a self-contained HTML page is made of."""
+"""Elements of a self-contained HTML page."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ VERDICTS = ("success", "failure")
 
 
 def page(title: str, body: str) -> str:
-    """Return a whole page that holds its style."""
+    """Return a whole page, style sheet included."""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
         f'<meta name="viewport" content="width=device-width">\n<title>{escape(title)}</title>\n'
@@ -23,12 +23,12 @@ def page(title: str, body: str) -> str:
 
 
 def section(heading: str, content: str) -> str:
-    """Return a heading and what follows it; nothing where there is nothing."""
+    """Return a heading with its content, or nothing if there is no content."""
     return f"<h2>{heading}</h2>\n{content}" if content else ""
 
 
 def figures(pictures: Iterable[Picture]) -> str:
-    """Return pictures with their captions, side by side where there is room."""
+    """Return pictures with their captions, side by side if the page is wide enough."""
     each = "\n".join(
         f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,'
         f'{base64.b64encode(png).decode()}"><figcaption>{escape(caption)}</figcaption></figure>'
@@ -38,7 +38,7 @@ def figures(pictures: Iterable[Picture]) -> str:
 
 
 def table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
-    """One line per row, with those of the columns that any row has."""
+    """Return a table; columns that no row has are left out."""
     used = [column for column in columns if any(column in row for row in rows)]
     if not used:
         return ""
@@ -49,7 +49,7 @@ def table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:
 
 
 def pairs(values: Mapping[str, Any]) -> str:
-    """Return names and values, one line each."""
+    """Return a table of names and values."""
     rows = [f"<tr><th>{escape(words(key))}</th>{_td(value)}</tr>" for key, value in values.items()]
     return f"<table>\n{''.join(rows)}\n</table>" if rows else ""
 

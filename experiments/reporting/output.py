@@ -1,4 +1,4 @@
-"""Where a command writes: checked before the work, and never a half-written file."""
+"""Output folder and files of a command: checked before the work, written whole or not at all."""
 
 from __future__ import annotations
 
@@ -12,14 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from cell.errors import CellError
+from cell.errors import InputError
 
 
 @contextmanager
 def output_folder(path: Path) -> Iterator[Path]:
-    """Make the folder and check that it can be written, or raise `CellError` before any work.
+    """Make the folder and check that it is writable, before any work.
 
-    Folders that were made here are removed again if the work raises and left them empty.
+    Folders that were made here are removed again if the work raises and leaves them empty.
+
+    Raises:
+        InputError: The folder cannot be written to.
     """
     made = [folder for folder in (path, *path.parents) if not folder.exists()]
     try:
@@ -28,7 +31,7 @@ def output_folder(path: Path) -> Iterator[Path]:
         tempfile.TemporaryFile(dir=path).close()
     except OSError as error:
         _remove_empty(made)
-        raise CellError(f"Cannot write to folder '{path}': {error.strerror}.") from error
+        raise InputError(f"Cannot write to folder '{path}': {error.strerror}.") from error
     try:
         yield path
     except BaseException:
@@ -37,7 +40,7 @@ def output_folder(path: Path) -> Iterator[Path]:
 
 
 def _remove_empty(folders: list[Path]) -> None:
-    """Remove folders, innermost first, up to the first one that holds something."""
+    """Remove folders, innermost first, up to the first one that is not empty."""
     for folder in folders:
         try:
             folder.rmdir()
@@ -47,9 +50,9 @@ def _remove_empty(folders: list[Path]) -> None:
 
 @contextmanager
 def whole_file(path: Path) -> Iterator[Path]:
-    """Give a temporary name beside ``path`` to write to, which becomes ``path`` at the end.
+    """Provide a temporary file beside ``path``, which replaces ``path`` at the end.
 
-    If the work raises, ``path`` is as it was before.
+    If the work raises, ``path`` is unchanged.
     """
     temporary = path.with_name(f".{os.getpid()}-{path.name}")
     try:
@@ -60,7 +63,7 @@ def whole_file(path: Path) -> Iterator[Path]:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file, wholly or not at all."""
+    """Write a text file, whole or not at all."""
     with whole_file(path) as temporary:
         temporary.write_text(text, encoding="utf-8")
 

@@ -1,4 +1,4 @@
-"""Plots for the report, each from plain values to a PNG."""
+"""Plots for the report: plain values in, PNG out."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ DPI = 110
 
 
 def draw(plot: Plot) -> bytes:
-    """Draw the curves that an operation offers of a step, as a PNG."""
+    """Return the plot of a step's curves as a PNG."""
     figure, axes = _axes(plot.x_label, plot.y_label)
     for label, (x, y) in plot.curves.items():
         axes.plot(x, y, label=label)
@@ -30,12 +30,12 @@ def draw(plot: Plot) -> bytes:
 def plot_force_plate(
     time: np.ndarray, force: np.ndarray, phases: Sequence[tuple[str, float]] = ()
 ) -> bytes:
-    """Plot what the force plate under the jig feels.
+    """Plot the force on the force plate under the jig.
 
     Args:
         time: (n,) [s].
         force: (n, 3) force on the plate in W [N].
-        phases: Name and start [s] of what happens, drawn as labelled lines.
+        phases: Name and start [s] of each phase, drawn as labelled lines.
     """
     figure, axes = _axes("time [s]", "force [N]")
     axes.plot(time, np.abs(force[:, 2]), label="normal")

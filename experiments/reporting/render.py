@@ -1,7 +1,8 @@
-"""Pictures of a scene, without a display.
+"""Off-screen rendering of a scene.
 
 Rendering needs two system libraries: without libEGL Drake raises, without a DRI driver the process
-dies. So it is tried once in a child process; where it fails, callers get the reason and go on.
+crashes. So it is probed once in a child process; if that fails, callers get the reason and carry on
+without pictures.
 """
 
 from __future__ import annotations
@@ -27,15 +28,15 @@ from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import CameraInfo
 
-from cell.errors import CellError
+from cell.errors import RunFailure
 
 PACKAGES = "libegl1 libgl1-mesa-dri"
 PROBE_TIMEOUT = 120.0  # [s] A first start from a cold disk takes about ten.
 RENDERER = "pictures"
 
 
-class NoRendering(CellError):
-    """Pictures cannot be made on this machine, with the reason."""
+class NoRendering(RunFailure):
+    """This machine cannot render, with the reason."""
 
 
 @dataclass(frozen=True)
@@ -43,8 +44,8 @@ class View:
     """A camera C that looks at a point.
 
     Attributes:
-        p_WC: Where it is [m].
-        p_WTarget: What it looks at [m]; not straight above or below it.
+        p_WC: Position [m].
+        p_WTarget: Point that it looks at [m]; not vertically above or below it.
         fov_deg: Vertical field of view [deg].
         width, height: Of the picture, in pixels.
     """
@@ -57,7 +58,7 @@ class View:
 
     @property
     def X_WC(self) -> RigidTransform:
-        """Pose of the camera: x to the right, y down, z into the picture."""
+        """Pose of the camera: x to the right, y down, z into the image."""
         forward = np.subtract(self.p_WTarget, self.p_WC)
         right = np.cross(forward, [0.0, 0.0, 1.0])
         columns = [right, np.cross(forward, right), forward]
@@ -71,7 +72,7 @@ class View:
         return ColorRenderCamera(core, show_window=False)
 
 
-# Over the front edge of the table: both arms, jig and tray; and the jig with what is on it.
+# From over the front edge of the table: both arms, jig and tray; and a close-up of the jig.
 CELL_VIEW = View(p_WC=(0.8, 1.9, 1.25), p_WTarget=(0.0, 0.05, 0.25))
 JIG_VIEW = View(p_WC=(0.25, 0.6, 0.42), p_WTarget=(0.0, 0.15, 0.25))
 
@@ -79,22 +80,22 @@ JIG_VIEW = View(p_WC=(0.25, 0.6, 0.42), p_WTarget=(0.0, 0.15, 0.25))
 def take_picture(
     scene_graph: SceneGraph, root: Context, view: View, *, shadows: bool = True
 ) -> bytes:
-    """Return a PNG of the scene in its present state, which is left as it was.
+    """Return a PNG of the scene in its present state; the state is not changed.
 
     Args:
-        scene_graph: Whose geometries with the perception role are seen.
+        scene_graph: Its geometries with the perception role are rendered.
         root: Context of the diagram that the scene graph is in.
         view: The camera.
-        shadows: Whether things throw shadows; they have jagged edges on what is seen closely.
+        shadows: Whether to render shadows, which have jagged edges in close-ups.
 
     Raises:
-        NoRendering: Where `rendering_problem` has a reason.
+        NoRendering: `rendering_problem` returns a reason.
     """
     if reason := rendering_problem():
         raise NoRendering(reason)
     context = scene_graph.GetMyMutableContextFromRoot(root)
     scene_graph.AddRenderer(context, RENDERER, MakeRenderEngineVtk(_engine_parameters(shadows)))
-    # Else the new renderer gets no poses where they were computed before it came.
+    # Otherwise the new renderer gets no poses that were computed before it was added.
     context.SetAllCacheEntriesOutOfDate()
     try:
         query = scene_graph.get_query_output_port().Eval(context)
@@ -112,7 +113,7 @@ def png(pixels: np.ndarray) -> bytes:
 
 
 def _engine_parameters(shadows: bool) -> RenderEngineVtkParams:
-    """Return a lamp above, a weaker one across, and a little light at the camera."""
+    """Return a key light from above, a weaker fill light, and a light at the camera."""
     lamps = [
         LightParameter(type="directional", frame=frame, direction=direction, intensity=intensity)
         for frame, direction, intensity in (
@@ -142,14 +143,14 @@ def rendering_problem() -> str | None:
     if done.returncode == 0:
         return None
     if done.returncode < 0:
-        reason = f"the renderer died with signal {-done.returncode}"
+        reason = f"the renderer crashed with signal {-done.returncode}"
     else:
         reason = (done.stderr.strip().splitlines() or ["the renderer failed"])[-1]
     return f"{reason}; the packages {PACKAGES} may be missing"
 
 
-def _probe() -> None:
-    """Render nothing, to see whether the libraries are there."""
+def probe() -> None:
+    """Render an empty scene, to check that the system libraries are present."""
     camera = View((1.0, 0.0, 0.0), (0.0, 0.0, 0.0), width=8, height=8).camera()
     scene_graph = SceneGraph()
     scene_graph.AddRenderer(RENDERER, MakeRenderEngineVtk(RenderEngineVtkParams()))
@@ -158,4 +159,4 @@ def _probe() -> None:
 
 
 if __name__ == "__main__":
-    _probe()
+    probe()

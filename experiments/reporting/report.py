@@ -1,4 +1,4 @@
-"""The report of a run: one HTML file that holds its pictures and works offline."""
+"""The report of a run: one self-contained HTML file."""
 
 from __future__ import annotations
 
@@ -35,12 +35,14 @@ def write_report(
     Args:
         path: The HTML file; it appears whole or not at all.
         title: Of the page.
-        plan: What ``plan.json`` holds; empty if nothing was planned.
-        result: What ``result.json`` holds, with ``steps`` or ``cases``.
+        plan: Content of ``plan.json``; empty if nothing was planned.
+        result: Content of ``result.json``, with ``steps`` or ``cases``.
         pictures: Caption and PNG each, in order.
         plots: The same.
-        notes: What the reader has to know, for example why there are no pictures.
+        notes: Remarks for the reader, for example why there are no pictures.
     """
+    config = escape(json.dumps(result.get("config", {}), indent=2, default=str))
+    settings = f"<details><summary>All settings</summary><pre>{config}</pre></details>"
     sections = [
         _summary(title, result, notes),
         section("Steps", table(result.get("steps", ()), STEP_COLUMNS)),
@@ -51,7 +53,7 @@ def write_report(
         section("Measured", _measured(result)),
         section("Plan", _plan(plan)),
         section("Versions", pairs(result.get("versions", {}))),
-        section("Configuration", _json(result.get("config", {}))),
+        section("Configuration", settings),
     ]
     write_text(path, page(title, "\n".join(filter(None, sections))))
 
@@ -64,7 +66,7 @@ def _summary(title: str, result: Mapping[str, Any], notes: Sequence[str]) -> str
 
 
 def _measured(result: Mapping[str, Any]) -> str:
-    """Everything measured, one line per step and quantity."""
+    """Return all measured quantities, one row per step and quantity."""
     rows = []
     for step in (*result.get("steps", ()), *result.get("cases", ())):
         name = step.get("name") or "/".join(
@@ -76,7 +78,7 @@ def _measured(result: Mapping[str, Any]) -> str:
 
 
 def _outcomes(result: Mapping[str, Any]) -> list[dict[str, Any]]:
-    """Everything compared between successful and failed trials, one line per quantity and group."""
+    """Return the comparison of successful and failed trials, one row per quantity and group."""
     return [
         {"quantity": quantity, "outcome": outcome, **group, "welch_p": groups.get("welch_p")}
         for quantity, groups in result.get("by_outcome", {}).items()
@@ -90,8 +92,3 @@ def _plan(plan: Mapping[str, Any]) -> str:
     reasons = [f"<li>{escape(str(step['reason']))}</li>" for step in steps if "reason" in step]
     listed = f"<ol>{''.join(reasons)}</ol>" if reasons else ""
     return table(steps, PLAN_COLUMNS) + listed
-
-
-def _json(value: Mapping[str, Any]) -> str:
-    text = json.dumps(value, indent=2, default=str)
-    return f"<details><summary>All settings</summary><pre>{escape(text)}</pre></details>"

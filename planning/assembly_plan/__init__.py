@@ -1,4 +1,1 @@
-"""The plan as a whole: Algorithm 1's steps with orders and evidence, a general rule beside it.
-
-Also how a plan is written to a file and explained in words.
-"""
+"""The plan as a value: Algorithm 1's steps with orders and evidence; its file and its text."""

@@ -9,35 +9,32 @@ from rich.markup import escape
 from rich.table import Table
 
 from planning.assembly_plan.planner import FixingPlan
-from planning.feasibility.algorithm import READING, FixingStep
+from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import DIRECTIONS, open_directions
 from planning.feasibility.interference import Blocker
-from planning.feasibility.order import together
-from planning.ordering.explain import precedence_text
+from planning.feasibility.order import subassembly_name
+from planning.ordering.advice_format import precedence_text
 
 
 def step_table(plan: FixingPlan) -> Table:
-    """Return one row per step: what comes in, A by direction, posture and fixed part, and CoG."""
+    """Return a table of the steps: incoming item, A by direction, posture, fixed part and CoG."""
     table = Table(title=f"{plan.product}: {', '.join(plan.order)}", title_justify="left")
     for heading in ("step", "incoming", *DIRECTIONS, "posture / fixed", "up"):
         table.add_column(heading)
     table.add_column(escape("CoG height [mm]"), justify="right")
     for number, step in enumerate(plan.steps, start=1):
-        table.add_row(str(number), *_step_cells(step))
+        digits = [str(step.directions[j]) for j in DIRECTIONS]
+        chosen = f"{step.posture} / {step.fixed_part}"
+        height = f"{1e3 * step.cog_height:.1f}"
+        table.add_row(str(number), step.item, *digits, chosen, step.up, height)
     return table
-
-
-def _step_cells(step: FixingStep) -> list[str]:
-    digits = [str(step.directions[j]) for j in DIRECTIONS]
-    chosen = f"{step.posture} / {step.fixed_part}"
-    return [step.item, *digits, chosen, step.up, f"{1e3 * step.cog_height:.1f}"]
 
 
 def stop_text(plan: FixingPlan) -> str:
     """Return why Algorithm 1 stopped, with the evidence for each direction; "" if it did not."""
     if plan.stop is None:
         return ""
-    stop, target = plan.stop, together(plan.order[: len(plan.steps) + 1])
+    stop, target = plan.stop, subassembly_name(plan.order[: len(plan.steps) + 1])
     lines = [f"Infeasible: {stop.item} cannot be added to {target}: {stop.reason}."]
     return "\n".join(lines + [f"  {blocker_text(blocker)}" for blocker in stop.blockers])
 
@@ -52,7 +49,11 @@ def blocker_text(blocker: Blocker) -> str:
 
 
 def explanation(plan: FixingPlan) -> str:
-    """Return everything the plan rests on: matrices, A lists, reasons, and all blocked pairs."""
+    """Return the basis of the plan: matrices, A lists, reasons, and all blocked pairs."""
+    part, direction = plan.parts.index, DIRECTIONS.index
+    blockers = sorted(
+        plan.blockers, key=lambda b: (part(b.moving), part(b.staying), direction(b.direction))
+    )
     sections = [
         "Contact C:\n" + matrix_text(plan.parts, plan.contact),
         "Interference-free M_j: 1 = the row's part leaves the column's part along j",
@@ -62,8 +63,8 @@ def explanation(plan: FixingPlan) -> str:
         *([precedence_text(plan.orders)] if plan.orders and plan.orders.ranked else []),
         "Steps:\n" + "\n".join(step_texts(plan)),
         "Reading: " + READING,
-        "Blocked, with a point of the part that stays, in the product frame:\n"
-        + "\n".join("  " + blocker_text(blocker) for blocker in _sorted(plan)),
+        "Blocked, with a point of the stationary part, in the product frame:\n"
+        + "\n".join("  " + blocker_text(blocker) for blocker in blockers),
     ]
     return "\n\n".join(sections)
 
@@ -71,7 +72,7 @@ def explanation(plan: FixingPlan) -> str:
 def step_texts(plan: FixingPlan) -> list[str]:
     """Return each step's A list and reason."""
     return [
-        f"  A({together(plan.order[: number + 1])}; {step.item}): "
+        f"  A({subassembly_name(plan.order[: number + 1])}; {step.item}): "
         f"{', '.join(open_directions(step.directions))}. {step.reason}"
         for number, step in enumerate(plan.steps)
     ]
@@ -83,10 +84,3 @@ def matrix_text(names: Iterable[str], matrix: np.ndarray) -> str:
     width = max(map(len, names))
     rows = zip(names, matrix, strict=True)
     return "\n".join(f"  {name:{width}}  {' '.join(map(str, row))}" for name, row in rows)
-
-
-def _sorted(plan: FixingPlan) -> list[Blocker]:
-    part, direction = plan.parts.index, DIRECTIONS.index
-    return sorted(
-        plan.blockers, key=lambda b: (part(b.moving), part(b.staying), direction(b.direction))
-    )

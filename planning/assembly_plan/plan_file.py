@@ -1,4 +1,4 @@
-"""``plan.json``: a fixing plan on file, for other programs and for a later stage."""
+"""``plan.json``: a fixing plan as a file, for other programs and for later stages."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
-from cell.errors import CellError
+from cell.errors import InputError
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING, FixingStep, Stop
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence import evidence_from_dict, evidence_to_dict
 from planning.feasibility.interference import Blocker
-from planning.ordering.advice_file import advice_from_dict, advice_to_dict
+from planning.ordering.advice_format import advice_from_dict, advice_to_dict
 
 
 def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
@@ -59,12 +59,12 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
 
 
 def save_plan(plan: FixingPlan, file: Path, **sections: Any) -> None:
-    """Write a plan; the file appears only when it is complete.
+    """Write a plan; the file appears whole or not at all.
 
     Args:
         plan: The plan.
         file: ``plan.json``.
-        sections: More of it, plain values by name, which ``load_plan`` leaves alone.
+        sections: Further sections of the file, plain values by name, which ``load_plan`` ignores.
     """
     partial = file.with_name(file.name + ".part")
     # One line per key: a matrix row on a line each would run to 100 000 lines for 100 parts.
@@ -75,15 +75,19 @@ def save_plan(plan: FixingPlan, file: Path, **sections: Any) -> None:
 
 
 def load_plan(file: Path) -> FixingPlan:
-    """Read a plan that ``save_plan`` wrote."""
+    """Read a plan that ``save_plan`` wrote.
+
+    Raises:
+        InputError: The file cannot be read, or is not a plan.
+    """
     try:
         return plan_from_dict(json.loads(file.read_text()))
     except OSError as error:
-        raise CellError(f"Plan file '{file}' cannot be read: {error.strerror}.") from error
+        raise InputError(f"Plan file '{file}' cannot be read: {error.strerror}.") from error
     except KeyError as error:
-        raise CellError(f"'{file}' is not a complete plan file: it lacks {error}.") from error
+        raise InputError(f"'{file}' is not a complete plan file: it lacks {error}.") from error
     except (ValueError, TypeError) as error:
-        raise CellError(f"'{file}' is not a plan file: {error}.") from error
+        raise InputError(f"'{file}' is not a plan file: {error}.") from error
 
 
 def _step_to_dict(step: FixingStep) -> dict[str, Any]:

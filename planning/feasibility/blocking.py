@@ -1,12 +1,13 @@
 """Which parts block which others along one axis, with the margin of each decision.
 
-Three rounds, each for what the one before left open. Bounding boxes: parts that pass each other.
-Widest faces, for all pairs of parts at once: two large faces in each other's way settle most
-blocked pairs. All faces that can hit each other: only regions made of slivers need their union.
+Three rounds, each for the pairs that the previous one left undecided. Bounding boxes find parts
+that pass each other. The widest faces, for all pairs of parts at once, settle most blocked pairs:
+two large faces in each other's way suffice. All faces that can hit each other decide the rest; only
+regions made of slivers need their union.
 
 A decision flips at some critical tolerance, below which the pair is blocked and above which it is
-free. It is not looked for where it does not matter: a pair blocked at 1.5 times the tolerance, or
-free at half of it, is decided with a margin of at least half the tolerance (0.025 mm of 0.05).
+free. It is computed only where it matters: a pair blocked at 1.5 times the tolerance, or free at
+half of it, is decided with a margin of at least half the tolerance (0.025 mm of 0.05).
 """
 
 from __future__ import annotations
@@ -26,19 +27,19 @@ from planning.feasibility.face_pairs import (
     paired,
 )
 
-# Of the tolerance: a decision with less margin than this is worth a remark. [D] Seen edge on, a
-# layer of overlap as thick as the tolerance lets a disc of half the tolerance in, and no larger.
+# Of the tolerance: a decision with less margin than this is reported. [D] Seen edge on, a layer of
+# overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
-HALVINGS = 5  # Of the 0.025 mm in which a fragile decision flips: to 0.8 um.
+HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um.
 
-HEAD = 24  # Widest faces of each part that the second round looks at, up and down.
+HEAD = 24  # Widest faces of each part that the second round uses, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
 SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
 FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 48  # Faces of a finely tessellated part that are tried before all of them are.
-SEEDS, NEAR = 4, 4.0  # Widest slivers that are merged with those within so many tolerances.
+SEEDS, NEAR = 4, 4.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +48,7 @@ class Decision:
 
     Attributes:
         point: (2,) a point of the plane across the axis over which it is hit [m]; None if free.
-        margin: How much the tolerance can change before the decision flips [m], at least.
+        margin: Lower bound of the change of tolerance at which the decision flips [m].
     """
 
     point: np.ndarray | None
@@ -55,18 +56,18 @@ class Decision:
 
 
 def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, int], Decision]:
-    """Return a decision for each ordered pair (moving, staying) whose boxes are in the way.
+    """Return a decision for each ordered pair (moving, stationary) whose boxes are in the way.
 
     Args:
         views: The parts' envelopes along one axis.
         tolerance: Height of overlap and radius of the region that do not count [m].
 
-    Pairs left out are free, by a margin of ``FRAGILE`` of the tolerance or more.
+    Pairs left out are free, by a margin of at least ``FRAGILE`` times the tolerance.
     """
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
     hits = _wide_hits(views, pairs, more)
-    hits |= _seen_hits(dict(_probes(views, pairs, hits, more)), more)
+    hits |= _region_hits(dict(_probes(views, pairs, hits, more)), more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
@@ -87,7 +88,7 @@ def _probes(
     known: Mapping[tuple[int, int], np.ndarray],
     tolerance: float,
 ) -> Iterator[tuple[tuple[int, int], FacePairs]]:
-    """Yield a few of the face pairs of finely tessellated parts that are not settled yet."""
+    """Yield a sample of the face pairs of finely tessellated parts that are undecided."""
     for i, k in ((int(i), int(k)) for i, k in pairs):
         down, up = views[i].down, views[k].up
         if (i, k) not in known and len(down.low) * len(up.low) > DENSE:
@@ -112,7 +113,7 @@ def _meeting_boxes(views: Sequence[Envelope], tolerance: float) -> np.ndarray:
 def _wide_hits(
     views: Sequence[Envelope], pairs: np.ndarray, tolerance: float
 ) -> dict[tuple[int, int], np.ndarray]:
-    """Return a blocked point (2,) for each pair of parts that two of their widest faces settle."""
+    """Return a blocked point (2,) for each pair that two of their widest faces prove blocked."""
     down, up = _heads([v.down for v in views]), _heads([v.up for v in views])
     rows = max(1, SHARE // HEAD**2)
     hits: dict[tuple[int, int], np.ndarray] = {}
@@ -128,7 +129,7 @@ def _wide_hits(
 
 
 def _heads(faces: Sequence[Faces]) -> Faces:
-    """Return the widest faces of all parts in one, ``HEAD`` a part; padding has an empty box."""
+    """Return the widest faces of all parts in one, ``HEAD`` per part; padding has an empty box."""
     count = len(faces) * HEAD
     corners, planes = np.zeros((count, 3, 2)), np.zeros((count, 3))
     low, high = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
@@ -164,16 +165,23 @@ def _decided(
     group: dict[tuple[int, int], FacePairs], tolerance: float
 ) -> dict[tuple[int, int], Decision]:
     """Decide pairs of parts from all their faces that can hit each other at the lower tolerance."""
+    less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     group = {parts: pairs for parts, pairs in group.items() if len(pairs)}
-    hits = _seen_hits(group, (1.0 + FRAGILE) * tolerance)
+    hits = _region_hits(group, more)
     found = {parts: Decision(point, FRAGILE * tolerance) for parts, point in hits.items()}
     for parts, pairs in group.items():
-        if parts not in found:
-            found[parts] = _decide(pairs, tolerance)
+        if parts in found:
+            continue
+        if _blocked_point(pairs, less) is None:
+            found[parts] = Decision(None, FRAGILE * tolerance)
+        elif (point := _blocked_point(pairs, more)) is not None:
+            found[parts] = Decision(point, FRAGILE * tolerance)
+        else:
+            found[parts] = _bisected(pairs, tolerance)
     return found
 
 
-def _seen_hits(
+def _region_hits(
     group: Mapping[tuple[int, int], FacePairs], tolerance: float
 ) -> dict[tuple[int, int], np.ndarray]:
     """Return a blocked point (2,) where one region, or one with its neighbours, is wide enough."""
@@ -228,24 +236,15 @@ def _clipped(
     }
 
 
-def _decide(pairs: FacePairs, tolerance: float) -> Decision:
-    """Decide one pair of parts by the union of its regions."""
-    less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
-    if _blocked_point(pairs, less) is None:
-        return Decision(None, FRAGILE * tolerance)
-    point = _blocked_point(pairs, more)
-    return _bisected(pairs, tolerance) if point is None else Decision(point, FRAGILE * tolerance)
-
-
 def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     """Decide a pair of parts that is blocked at the lower tolerance and free at the higher."""
     point = _blocked_point(pairs, tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
-    same, flipped = 0.0, 1.0  # In steps: the decision is the same here, and flipped there.
+    same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
     for _ in range(HALVINGS):
         middle = (same + flipped) / 2
-        there = _blocked_point(pairs, tolerance + middle * step)
-        if (there is None) == (point is None):
+        changed = _blocked_point(pairs, tolerance + middle * step)
+        if (changed is None) == (point is None):
             same = middle
         else:
             flipped = middle
@@ -253,7 +252,7 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
 
 
 def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
-    """Return a point (2,) of the plane over which the faces block, if there is one."""
+    """Return a point (2,) of the plane over which the faces block, or None."""
     slivers: list[_Regions] = []
     for start in range(0, len(pairs), BATCH):
         batch = pairs.chosen(slice(start, start + BATCH))
@@ -266,7 +265,7 @@ def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
 
 
 def _wide_point(slivers: Sequence[_Regions], tolerance: float) -> np.ndarray | None:
-    """Return a point (2,) of the slivers' union that is wide enough around it, if there is one."""
+    """Return a point (2,) about which the slivers' union is wide enough, or None."""
     if sum(float(regions.areas.sum()) for regions in slivers) < np.pi * tolerance**2:
         return None
     filled = [regions.polygons.chosen(regions.areas > 0.0) for regions in slivers]

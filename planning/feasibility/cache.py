@@ -1,8 +1,8 @@
-"""Matrices kept by content: planning the same parts again takes as long as reading a file.
+"""Cache of matrices, keyed by content: planning the same parts again only reads a file.
 
-The key is a digest of everything the matrices follow from: corners and faces of every part in the
-product frame, declared fasteners and tolerance, and the planner's own source, so that a new version
-never reads an old one's results. A file that cannot be read counts as absent.
+The key is a digest of everything that determines the matrices: vertices and faces of every part in
+the product frame, declared screws and tolerance, and this package's own source, so that a new
+version never reads results of an old one. A file that cannot be read counts as absent.
 """
 
 from __future__ import annotations
@@ -21,11 +21,11 @@ from typing import Any
 import numpy as np
 
 from cell.products.product import Product
+from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import Blocker, Interference
-from planning.feasibility.matrices import Matrices, matrices_of
+from planning.feasibility.matrices import AssemblyMatrices, matrices_of
 from planning.feasibility.solids import Solid, solids_of
-from planning.feasibility.threads import Thread
 
 
 def user_cache() -> Path:
@@ -34,8 +34,8 @@ def user_cache() -> Path:
     return (Path(root) if root else Path.home() / ".cache") / "soft-jig"
 
 
-def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> Matrices:
-    """Return the same as ``matrices_of``, from the folder if it has been computed before."""
+def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> AssemblyMatrices:
+    """Return what ``matrices_of`` returns, read from the folder if it was computed before."""
     solids = solids_of(product)
     declared = product.contact_tolerance if tolerance is None else tolerance
     file = folder / f"{key_of(product, solids, declared)}.npz"
@@ -47,9 +47,8 @@ def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> 
 
 
 def key_of(product: Product, solids: Mapping[str, Solid], tolerance: float | None) -> str:
-    """Return a digest of what the matrices of a product follow from."""
-    digest = hashlib.blake2b(digest_size=20)
-    digest.update(_source_digest())
+    """Return a digest of everything that determines the matrices of a product."""
+    digest = hashlib.blake2b(_source_digest(), digest_size=20)
     pairs = sorted((f.part, f.into, f.pitch) for f in product.screws.values())
     digest.update(json.dumps([tolerance, pairs]).encode())
     for name, solid in solids.items():
@@ -67,21 +66,23 @@ def _source_digest() -> bytes:
     return digest.digest()
 
 
-def save_matrices(matrices: Matrices, file: Path) -> None:
-    """Write matrices; a folder that cannot be written to is no reason to fail."""
+def save_matrices(matrices: AssemblyMatrices, file: Path) -> None:
+    """Write matrices to a file; do nothing if the folder cannot be written to."""
     text = {
         "names": list(matrices.solids),
         "tolerance": matrices.tolerance,
         "threads": [asdict(thread) for thread in matrices.threads],
-        "blockers": [[b.moving, b.staying, b.direction] for b in matrices.leaving.blockers],
+        "blockers": [[b.moving, b.staying, b.direction] for b in matrices.interference.blockers],
     }
     arrays = {
         "text": np.array(json.dumps(text)),
         "contact": matrices.contact,
         "contact_margin": matrices.contact_margin,
-        "free": np.array([matrices.leaving.free[j] for j in DIRECTIONS], np.int8),
-        "margin": np.array([matrices.leaving.margin[j] for j in DIRECTIONS]),
-        "hits": np.array([[*b.p_AoQ, b.travel] for b in matrices.leaving.blockers]).reshape(-1, 4),
+        "free": np.array([matrices.interference.free[j] for j in DIRECTIONS], np.int8),
+        "margin": np.array([matrices.interference.margin[j] for j in DIRECTIONS]),
+        "hits": np.array([[*b.p_AoQ, b.travel] for b in matrices.interference.blockers]).reshape(
+            -1, 4
+        ),
     }
     try:
         file.parent.mkdir(parents=True, exist_ok=True)
@@ -92,8 +93,8 @@ def save_matrices(matrices: Matrices, file: Path) -> None:
         return
 
 
-def load_matrices(file: Path, solids: Mapping[str, Solid]) -> Matrices | None:
-    """Return what ``save_matrices`` wrote for these parts, or None if that is not there."""
+def load_matrices(file: Path, solids: Mapping[str, Solid]) -> AssemblyMatrices | None:
+    """Return what ``save_matrices`` wrote for these parts, or None if there is no such file."""
     try:
         with np.load(file) as arrays:
             return _restored({name: arrays[name] for name in arrays.files}, solids)
@@ -101,7 +102,7 @@ def load_matrices(file: Path, solids: Mapping[str, Solid]) -> Matrices | None:
         return None
 
 
-def _restored(arrays: Mapping[str, Any], solids: Mapping[str, Solid]) -> Matrices | None:
+def _restored(arrays: Mapping[str, Any], solids: Mapping[str, Solid]) -> AssemblyMatrices | None:
     text = json.loads(str(arrays["text"]))
     if text["names"] != list(solids):
         return None
@@ -114,10 +115,10 @@ def _restored(arrays: Mapping[str, Any], solids: Mapping[str, Solid]) -> Matrice
     free = {j: arrays["free"][k].astype(int) for k, j in enumerate(DIRECTIONS)}
     margin = {j: arrays["margin"][k] for k, j in enumerate(DIRECTIONS)}
     threads = tuple(
-        Thread(**thread | {key: tuple(thread[key]) for key in ("axis", "p_AoT")})
+        CadThread(**thread | {key: tuple(thread[key]) for key in ("axis", "p_AoT")})
         for thread in text["threads"]
     )
-    return Matrices(
+    return AssemblyMatrices(
         solids,
         text["tolerance"],
         arrays["contact"],

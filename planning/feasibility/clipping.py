@@ -1,4 +1,4 @@
-"""Many small convex polygons at once: clip by half planes, measure, and merge."""
+"""Vectorised operations on many small convex polygons: clipping, areas, inscribed discs, union."""
 
 from __future__ import annotations
 
@@ -53,8 +53,8 @@ class Polygons:
         share = np.divide(signed, signed - signed_next, out=np.zeros_like(signed), where=crossed)
         crossings = self.corners + share[:, :, None] * (self.corners[row, following] - self.corners)
         # Each corner is followed by the crossing on its edge; without the unused slots that is the
-        # clipped outline in order. It has one corner more at most, unless rounding has made dents
-        # of 1e-18 m into the polygon, as where edges coincide: then a line may cross it four times.
+        # clipped outline in order. It gains one corner at most, unless edges coincide and rounding
+        # dents the polygon by 1e-18 m: then a line may cross it four times.
         outline = np.stack([self.corners, crossings], axis=2).reshape(n, 2 * k, 2)
         used = np.stack([kept, crossed], axis=2).reshape(n, 2 * k)
         place, count = np.cumsum(used, axis=1) - 1, np.count_nonzero(used, axis=1)
@@ -78,7 +78,7 @@ class Polygons:
         return 0.5 * np.einsum("ij->i", x * y_next - x_next * y)
 
     def discs(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return a disc in each polygon: the largest about its centroid.
+        """Return a disc in each polygon: the largest one centred on its centroid.
 
         Its radius is a third or more of the polygon's width, and half of it for the strips that
         facets make.
@@ -96,15 +96,15 @@ class Polygons:
         cx = np.einsum("ij,ij->i", 2.0 * x + ex, share)
         cy = np.einsum("ij,ij->i", 2.0 * y + ey, share)
         away = ex * (cy[:, None] - y) - ey * (cx[:, None] - x)
-        # Edges that rounding has left point anywhere; and no disc is wider than twice the area
-        # by the perimeter, which holds where rounding has left nothing but such edges.
+        # Edges as short as rounding have no meaningful direction and are skipped. If all edges are,
+        # the bound of twice the area over the perimeter limits the disc.
         away = np.divide(away, lengths, out=np.full_like(away, np.inf), where=lengths > ROUNDING)
         most = total / np.where(filled, np.einsum("ij->i", lengths), 1.0)
         radii = np.where(filled, np.clip(away.min(axis=1), 0.0, np.maximum(most, 0.0)), 0.0)
         return np.column_stack([cx, cy]) + self.corners[:, 0], radii
 
     def _from_first(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return coordinates (n, k) from the first corner: none is lost far from the origin."""
+        """Return coordinates (n, k) relative to the first corner, to keep precision far from A."""
         offsets = self.closed() - self.corners[:, :1]
         return offsets[..., 0], offsets[..., 1]
 
@@ -136,8 +136,8 @@ def triangle_overlaps(a: np.ndarray, b: np.ndarray) -> Polygons:
 
 
 def point_in_wide_union(several: Sequence[Polygons], radius: float) -> np.ndarray | None:
-    """Return a point (2,) of the union that a disc of the radius [m] fits around, if one does."""
-    # Clipper rounds to fixed decimals: measuring in radii keeps any size of part away from that.
+    """Return the centre (2,) of a disc of the radius [m] inside the union, or None."""
+    # Clipper rounds to fixed decimals: lengths in units of the radius are far coarser than that.
     outlines = [outline for polygons in several for outline in polygons.outlines(1.0 / radius)]
     union = manifold3d.CrossSection(outlines, manifold3d.FillRule.NonZero)
     # Growing by a thousandth first closes the seams that rounding leaves between neighbours.

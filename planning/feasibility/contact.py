@@ -1,16 +1,19 @@
-"""Contact matrix C: which parts touch in the assembled product.
+"""Contact matrix C: which parts touch in the assembled product, and within which tolerance.
 
-Two parts touch when their surfaces are no further apart than the product's tolerance, or when one
-lies in the other's material. The tolerance is declared, or derived from the product, because CAD
-puts a gap into every fit: it lies above the gaps that mean "touches" (line-to-line faces: rounding,
-1e-9 m) and below the clearances that do not (0.075 mm radial between boss and bore, 0.2 mm between
-bolt and clearance hole).
+Two parts touch when their surfaces are no further apart than the tolerance, or when one lies in the
+other's material. CAD puts a gap into every fit, so the tolerance lies above the gaps that mean
+"touches" (line-to-line faces: rounding, 1e-9 m) and below the clearances that do not (0.075 mm
+radial between boss and bore, 0.2 mm between bolt and clearance hole).
+
+A product may declare its tolerance. Otherwise it is derived: 0.05 mm, above the sagitta and the
+rounding of typical meshes; less for small parts; and less than the smallest clearance, so that a
+part with play counts as not touching the wall of its hole, however small the play is.
 
 Distances come from FCL's triangle BVH. Compared with coal's ``security_margin`` on motor, plate and
 six bolts lifted apart by 0 ... 0.3 mm, every answer was the same, at 10-38 ms a product against
-1-105 ms, for 28 MB installed instead of 316 MB. Building a BVH costs most, 4 us a face [M], so only
-faces go into it whose boxes come near the other part's faces; and where a few of the widest of them
-touch already, no others.
+1-105 ms, for 28 MB installed instead of 316 MB. Building a BVH costs most, 4 us a face [M], so it
+holds only faces whose boxes come near the other part's faces; and if a few of the widest of these
+touch already, the rest are skipped.
 """
 
 from __future__ import annotations
@@ -24,7 +27,12 @@ from planning.feasibility.face_pairs import box_pairs
 from planning.feasibility.solids import Solid
 
 WIDEST = 16  # Faces of one part that are compared with the other's before all are.
-TOUCHING = 1e-9  # [m] [D] Faces drawn on each other are met to the rounding of float64, 1e-16 m.
+TOUCHING = 1e-9  # [m] [D] Faces drawn on each other coincide to the rounding of float64, 1e-16 m.
+
+USUAL = 5e-5  # [m] [A] Default tolerance: seven times the sagitta of a fine mesh (7 um: r 6, n 64).
+PER_SIZE = 1.0 / 200.0  # [A] Of the smallest part's length: 0.05 mm for a screw of 10 mm.
+PER_CLEARANCE = 2.0 / 3.0  # [A] Leaves a third of the clearance as margin.
+LINE_TO_LINE = 0.2  # [A] Of the tolerance: gaps up to this are rounding or sagitta, not clearance.
 
 
 def surface_gap(a: Solid, b: Solid) -> float:
@@ -33,9 +41,14 @@ def surface_gap(a: Solid, b: Solid) -> float:
 
 
 def near_gap(a: Solid, b: Solid, reach: float) -> float:
-    """Return the same where it is at most the reach [m], and infinity where it is more."""
+    """Return the distance between two surfaces if it is at most the reach [m], else infinity."""
     faces_a, faces_b = _near_faces(a, b, reach), _near_faces(b, a, reach)
-    if _gap(a, b, *_widest_meeting(a, b, faces_a, faces_b, reach)) <= TOUCHING:
+    # First a few of the widest faces, with some faces of the other part near them.
+    few = faces_a[:WIDEST]
+    low_a, high_a, low_b, high_b = _boxes(a, b, few, faces_b, reach)
+    meet = (low_a[:, None] <= high_b) & (high_a[:, None] >= low_b)
+    near = np.flatnonzero(meet.all(axis=2).any(axis=0))
+    if _gap(a, b, few, faces_b[near[: 2 * WIDEST]]) <= TOUCHING:
         return 0.0
     gap = _gap(a, b, *_meeting(a, b, faces_a, faces_b, reach))
     return gap if gap <= reach else np.inf
@@ -56,17 +69,6 @@ def _boxes(
     """Return the boxes of faces, those of the first part enlarged by the reach."""
     (low_a, high_a), (low_b, high_b) = a.face_boxes, b.face_boxes
     return low_a[faces_a] - reach, high_a[faces_a] + reach, low_b[faces_b], high_b[faces_b]
-
-
-def _widest_meeting(
-    a: Solid, b: Solid, faces_a: np.ndarray, faces_b: np.ndarray, reach: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return a few of the widest faces, and some faces of the other part near them."""
-    few = faces_a[:WIDEST]
-    low_a, high_a, low_b, high_b = _boxes(a, b, few, faces_b, reach)
-    meet = (low_a[:, None] <= high_b) & (high_a[:, None] >= low_b)
-    near = np.flatnonzero(meet.all(axis=2).any(axis=0))
-    return few, faces_b[near[: 2 * WIDEST]]
 
 
 def _meeting(
@@ -91,7 +93,7 @@ def _gap(a: Solid, b: Solid, faces_a: np.ndarray, faces_b: np.ndarray) -> float:
 
 
 def one_inside_other(a: Solid, b: Solid) -> bool:
-    """Say whether a part lies in the other's material; only asked when the surfaces are apart."""
+    """Return whether a part lies in the other's material, given that their surfaces are apart."""
     a_in_b = np.all(a.lower >= b.lower) and np.all(a.upper <= b.upper)
     b_in_a = np.all(b.lower >= a.lower) and np.all(b.upper <= a.upper)
     # A ball in the cavity of a box has no common volume with it, a ball in its wall has.
@@ -99,7 +101,7 @@ def one_inside_other(a: Solid, b: Solid) -> bool:
 
 
 def gap_matrix(solids: Sequence[Solid], reach: float) -> np.ndarray:
-    """Return how far apart parts are, where that is near.
+    """Return the pairwise distances between parts, up to a reach.
 
     Args:
         solids: The n parts, in matrix order.
@@ -131,3 +133,21 @@ def contact_matrix(gaps: np.ndarray, tolerance: float) -> np.ndarray:
         triangular so that C + C^T holds no 2.
     """
     return np.triu(gaps <= tolerance, 1).astype(int)
+
+
+def largest_tolerance(solids: Sequence[Solid]) -> float:
+    """Return the default tolerance of parts without clearances [m], from their sizes."""
+    smallest = min(float(np.max(solid.upper - solid.lower)) for solid in solids)
+    return min(USUAL, PER_SIZE * smallest)
+
+
+def default_tolerance(solids: Sequence[Solid], gaps: np.ndarray) -> float:
+    """Return the default tolerance [m].
+
+    Args:
+        solids: The n parts.
+        gaps: (n, n) as ``gap_matrix`` returns them [m].
+    """
+    largest = largest_tolerance(solids)
+    clearances = gaps[gaps > LINE_TO_LINE * largest]
+    return min(largest, PER_CLEARANCE * float(np.min(clearances, initial=np.inf)))

@@ -1,4 +1,4 @@
-"""A solid seen along an axis: its up-faces and down-faces as planes over their projections."""
+"""A solid seen along an axis: its up-faces and down-faces, projected across the axis."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from planning.feasibility.solids import Solid
 # Right-handed (u, v, h): coordinates across the axis, and height h along it.
 PLANE = {0: (1, 2, 0), 1: (2, 0, 1), 2: (0, 1, 2)}
 
-# A face steeper than this is a wall: 0.1 m of it is 0.1 um wide seen from above, far below any
-# tolerance on fits, and rounding in a float32 mesh file (1e-8 m over 5 mm) tilts walls that much.
+# A face steeper than this counts as a wall: 0.1 m of it is 0.1 um wide seen from above, far below
+# any tolerance on fits, and rounding in a float32 mesh file (1e-8 m over 5 mm) tilts walls by that.
 WALL_SLOPE = 1e-6
 
 
@@ -74,7 +74,7 @@ def cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def envelope(solid: Solid, axis: int) -> Envelope:
-    """Sort a solid's faces by the side from which they are seen along axis 0, 1 or 2."""
+    """Split a solid's faces into up- and down-faces along axis 0, 1 or 2; walls are left out."""
     normals = solid.doubled_areas
     area2 = normals[:, axis]  # Of the projections, doubled: negative where a face looks down.
     wall = WALL_SLOPE * np.sqrt(np.einsum("ij,ij->i", normals, normals))
@@ -84,7 +84,7 @@ def envelope(solid: Solid, axis: int) -> Envelope:
 
 
 def _faces(solid: Solid, axis: int, chosen: np.ndarray, facing: int) -> Faces:
-    """Project the chosen faces along the axis; those that look down are turned over."""
+    """Project the chosen faces along the axis; the corners of down-faces are reversed."""
     normals, (low, high) = solid.doubled_areas, solid.face_boxes
     chosen = chosen[np.argsort(-facing * normals[chosen, axis], kind="stable")]
     u, v, h = PLANE[axis]

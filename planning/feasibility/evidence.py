@@ -1,7 +1,7 @@
-"""What the matrices rest on, for the reader of a plan: tolerance, threads, margins, remarks.
+"""Evidence behind the matrices, for the reader of a plan: tolerance, threads, margins, remarks.
 
-A decision is fragile if another tolerance, nearer than ``FRAGILE`` of it (0.025 mm of the usual
-0.05), would turn it over. The plan hangs on it if A(P_t, P_i) of some step would then differ.
+A decision is fragile if changing the tolerance by less than ``FRAGILE`` of it (0.025 mm of the
+usual 0.05) flips it. The plan depends on it if A(P_t, P_i) of some step then differs.
 """
 
 from __future__ import annotations
@@ -15,28 +15,29 @@ import numpy as np
 from cell.products.product import Product
 from planning.feasibility.algorithm import FixingStep, Stop
 from planning.feasibility.blocking import FRAGILE
+from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import opposite
 from planning.feasibility.freedom import Freedom, freedoms
-from planning.feasibility.matrices import Matrices
-from planning.feasibility.reachability import reachable_directions
-from planning.feasibility.threads import Thread
+from planning.feasibility.matrices import AssemblyMatrices, reachable_directions
 
-Places = Sequence[tuple[list[int], list[int]]]
+StepIndices = Sequence[tuple[list[int], list[int]]]
 """Matrix indices of target and incoming parts, for each step."""
 
-ALMOST = 1.0 - 1e-9  # A margin is fragile when it is less than the largest that is looked for.
+BELOW_CAP = (
+    1.0 - 1e-9
+)  # Margins are capped at FRAGILE times the tolerance; those below are fragile.
 
 
 @dataclass(frozen=True)
-class Fragile:
-    """A decision that a slightly different tolerance would turn over.
+class FragileDecision:
+    """A decision that a slightly different tolerance would flip.
 
     Attributes:
-        part: Name of the part that moves, or of one of two that touch.
-        other: Name of the part that stays, or of the other.
+        part: Name of the moving part, or of one of two that touch.
+        other: Name of the stationary part, or of the other.
         direction: "+x" ... "-z" of the motion; "contact" for an entry of C.
         value: The entry as it is, 0 or 1.
-        margin: By how much the tolerance can change before it flips, at least [m].
+        margin: Lower bound of the change of tolerance at which it flips [m].
         decides: Whether A(P_t, P_i) of some step of the plan would change with it.
     """
 
@@ -49,12 +50,12 @@ class Fragile:
 
 
 @dataclass(frozen=True)
-class Motion:
-    """How the parts of an item can move in the step in which it is added.
+class ItemFreedom:
+    """One way in which the parts of an item can move in the step in which it is added.
 
     Attributes:
         item: Of the order.
-        freedom: Direction, travel, and what they hit.
+        freedom: Direction, travel, and the part that is hit.
     """
 
     item: str
@@ -63,53 +64,55 @@ class Motion:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What the matrices of a plan rest on.
+    """What the matrices of a plan are based on.
 
     Attributes:
-        tolerance: Gap that still touches, and overlap that does not block [m].
-        declared: Whether the product declares it, or it was derived.
-        threads: Screw threads recognised from the meshes.
-        fragile: Decisions with a small margin, those that the plan hangs on first.
+        tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
+        declared: Whether the product declares it; else it was derived.
+        threads: Screw threads recognised in the meshes.
+        fragile: Decisions with a small margin, those that the plan depends on first.
         remarks: What was assumed or repaired while the product was read.
-        motions: Local freedom and slanted ways out, where they were asked for.
+        motions: Local freedom and slanted removal directions, if they were requested.
     """
 
     tolerance: float
     declared: bool
-    threads: tuple[Thread, ...]
-    fragile: tuple[Fragile, ...]
+    threads: tuple[CadThread, ...]
+    fragile: tuple[FragileDecision, ...]
     remarks: tuple[str, ...]
-    motions: tuple[Motion, ...] = ()
+    motions: tuple[ItemFreedom, ...] = ()
 
 
 def evidence_of(
-    product: Product, matrices: Matrices, steps: Sequence[FixingStep | Stop], *, slanted: bool
+    product: Product,
+    matrices: AssemblyMatrices,
+    steps: Sequence[FixingStep | Stop],
+    *,
+    slanted: bool,
 ) -> Evidence:
-    """Return what a plan's matrices rest on.
+    """Collect the evidence behind a plan.
 
     Args:
-        product: What is planned.
+        product: The planned product.
         matrices: Its matrices.
-        steps: The plan's steps, the one at which it stopped among them.
-        slanted: Whether to look for local freedom and slanted ways out as well.
+        steps: The plan's steps, including the one at which it stopped.
+        slanted: Whether to search for local freedom and slanted removal directions as well.
     """
-    names = list(matrices.solids)
-    places = [
-        ([names.index(part) for part in step.target], [names.index(part) for part in step.incoming])
-        for step in steps
-    ]
-    found = [*_fragile_contacts(matrices, places), *_fragile_motions(matrices, places)]
+    indices = [(matrices.indices(step.target), matrices.indices(step.incoming)) for step in steps]
+    found = [*_fragile_contacts(matrices, indices), *_fragile_motions(matrices, indices)]
     return Evidence(
         matrices.tolerance,
         product.contact_tolerance == matrices.tolerance,
         matrices.threads,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
         (*product.remarks, *_doubts(product.items(), matrices)),
-        tuple(_motions(matrices, steps)) if slanted else (),
+        tuple(_item_freedoms(matrices, steps)) if slanted else (),
     )
 
 
-def _motions(matrices: Matrices, steps: Sequence[FixingStep | Stop]) -> Iterator[Motion]:
+def _item_freedoms(
+    matrices: AssemblyMatrices, steps: Sequence[FixingStep | Stop]
+) -> Iterator[ItemFreedom]:
     solids = dict(matrices.solids)
     for thread in matrices.threads:
         solids[thread.nut] = solids[thread.nut].without(matrices.solids[thread.bolt])
@@ -117,11 +120,11 @@ def _motions(matrices: Matrices, steps: Sequence[FixingStep | Stop]) -> Iterator
         incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
         axes = [thread.axis for thread in matrices.threads if thread.bolt in step.incoming]
         for freedom in freedoms(incoming, target, matrices.tolerance, axes):
-            yield Motion(step.item, freedom)
+            yield ItemFreedom(step.item, freedom)
 
 
-def _doubts(items: Sequence[str], matrices: Matrices) -> list[str]:
-    """Return what a careful person would ask about."""
+def _doubts(items: Sequence[str], matrices: AssemblyMatrices) -> list[str]:
+    """Return remarks on input that is valid but probably unintended."""
     names = list(matrices.solids)
     if len(items) == 1:
         kind = "part" if len(names) == 1 else "item"
@@ -132,42 +135,45 @@ def _doubts(items: Sequence[str], matrices: Matrices) -> list[str]:
     return [f"{', '.join(alone)} {touch} no other part"] if alone else []
 
 
-def _fragile_contacts(matrices: Matrices, places: Places) -> list[Fragile]:
-    names, limit = list(matrices.solids), ALMOST * FRAGILE * matrices.tolerance
+def _fragile_contacts(matrices: AssemblyMatrices, steps: StepIndices) -> list[FragileDecision]:
+    names, limit = list(matrices.solids), BELOW_CAP * FRAGILE * matrices.tolerance
     found = []
     for i, k in np.argwhere(np.triu(matrices.contact_margin < limit, 1)):
         contact = matrices.contact.copy()
         contact[i, k] = 1 - contact[i, k]
-        decides = _changes(matrices, places, contact, matrices.leaving.free)
+        decides = _changes(matrices, steps, contact, matrices.interference.free)
         value, margin = int(matrices.contact[i, k]), float(matrices.contact_margin[i, k])
-        found.append(Fragile(names[i], names[k], "contact", value, margin, decides))
+        found.append(FragileDecision(names[i], names[k], "contact", value, margin, decides))
     return found
 
 
-def _fragile_motions(matrices: Matrices, places: Places) -> list[Fragile]:
-    names, limit = list(matrices.solids), ALMOST * FRAGILE * matrices.tolerance
+def _fragile_motions(matrices: AssemblyMatrices, steps: StepIndices) -> list[FragileDecision]:
+    names, limit = list(matrices.solids), BELOW_CAP * FRAGILE * matrices.tolerance
+    leaving = matrices.interference
     found = []
     for j in ("+x", "+y", "+z"):
-        for i, k in np.argwhere(matrices.leaving.margin[j] < limit):
-            free = dict(matrices.leaving.free)
+        for i, k in np.argwhere(leaving.margin[j] < limit):
+            free = dict(leaving.free)
             for d, row, column in ((j, i, k), (opposite(j), k, i)):
                 free[d] = free[d].copy()
                 free[d][row, column] = 1 - free[d][row, column]
-            decides = _changes(matrices, places, matrices.contact, free)
-            value = int(matrices.leaving.free[j][i, k])
-            margin = float(matrices.leaving.margin[j][i, k])
-            found.append(Fragile(names[i], names[k], j, value, margin, decides))
+            decides = _changes(matrices, steps, matrices.contact, free)
+            value, margin = int(leaving.free[j][i, k]), float(leaving.margin[j][i, k])
+            found.append(FragileDecision(names[i], names[k], j, value, margin, decides))
     return found
 
 
 def _changes(
-    matrices: Matrices, places: Places, contact: np.ndarray, free: Mapping[str, np.ndarray]
+    matrices: AssemblyMatrices,
+    steps: StepIndices,
+    contact: np.ndarray,
+    free: Mapping[str, np.ndarray],
 ) -> bool:
-    """Say whether other matrices give another A(P_t, P_i) in some step."""
-    now = matrices.contact, matrices.leaving.free
+    """Return whether other C and M_j give another A(P_t, P_i) in some step."""
+    now = matrices.contact, matrices.interference.free
     return any(
-        reachable_directions(contact, free, *place) != reachable_directions(*now, *place)
-        for place in places
+        reachable_directions(contact, free, *indices) != reachable_directions(*now, *indices)
+        for indices in steps
     )
 
 
@@ -183,47 +189,50 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
         thread["axis"] = list(thread["axis"])
     for decision in data["fragile"]:
         decision["margin_m"] = decision.pop("margin")
-    data["motions"] = [_motion_to_dict(motion) for motion in evidence.motions]
+    data["motions"] = [
+        {
+            "item": motion.item,
+            "direction": list(motion.freedom.direction),
+            "travel_m": None if motion.freedom.leaves else motion.freedom.travel,
+            "hits": motion.freedom.hits,
+        }
+        for motion in evidence.motions
+    ]
     return data | {key: list(data[key]) for key in ("threads", "fragile", "remarks")}
-
-
-def _motion_to_dict(motion: Motion) -> dict[str, Any]:
-    freedom = motion.freedom
-    return {
-        "item": motion.item,
-        "direction": list(freedom.direction),
-        "travel_m": None if freedom.leaves else freedom.travel,
-        "hits": freedom.hits,
-    }
 
 
 def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
     """Return the evidence that ``evidence_to_dict`` described."""
+    threads = [
+        CadThread(
+            bolt=thread["bolt"],
+            nut=thread["nut"],
+            axis=tuple(thread["axis"]),
+            p_AoT=tuple(thread["middle_m"]),
+            diameter=thread["diameter_m"],
+            height=thread["height_m"],
+            length=thread["length_m"],
+        )
+        for thread in data["threads"]
+    ]
+    names = ("part", "other", "direction", "value", "decides")
+    fragile = [
+        FragileDecision(margin=decision["margin_m"], **{name: decision[name] for name in names})
+        for decision in data["fragile"]
+    ]
+    motions = []
+    for motion in data["motions"]:
+        x, y, z = motion["direction"]
+        travel = float("inf") if motion["travel_m"] is None else motion["travel_m"]
+        motions.append(ItemFreedom(motion["item"], Freedom((x, y, z), travel, motion["hits"])))
     return Evidence(
         data["tolerance_m"],
         data["declared"],
-        tuple(_thread_from_dict(thread) for thread in data["threads"]),
-        tuple(_fragile_from_dict(decision) for decision in data["fragile"]),
+        tuple(threads),
+        tuple(fragile),
         tuple(data["remarks"]),
-        tuple(_motion_from_dict(motion) for motion in data["motions"]),
+        tuple(motions),
     )
-
-
-def _motion_from_dict(data: Mapping[str, Any]) -> Motion:
-    x, y, z = data["direction"]
-    travel = float("inf") if data["travel_m"] is None else data["travel_m"]
-    return Motion(data["item"], Freedom((x, y, z), travel, data["hits"]))
-
-
-def _thread_from_dict(data: Mapping[str, Any]) -> Thread:
-    lengths = {name: data[f"{name}_m"] for name in ("diameter", "height", "length")}
-    axis, middle = tuple(data["axis"]), tuple(data["middle_m"])
-    return Thread(data["bolt"], data["nut"], axis, middle, **lengths)
-
-
-def _fragile_from_dict(data: Mapping[str, Any]) -> Fragile:
-    fields = {name: data[name] for name in ("part", "other", "direction", "value", "decides")}
-    return Fragile(margin=data["margin_m"], **fields)
 
 
 def evidence_text(evidence: Evidence) -> str:
@@ -231,9 +240,17 @@ def evidence_text(evidence: Evidence) -> str:
     source = "declared by the product" if evidence.declared else "by default"
     lines = [f"Tolerance {1e3 * evidence.tolerance:.3g} mm, {source}."]
     lines += [f"Note: {remark}" for remark in evidence.remarks]
-    lines += [_thread_text(thread) for thread in evidence.threads]
+    lines += [
+        f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
+        f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
+        for thread in evidence.threads
+    ]
     lines += [_fragile_text(decision) for decision in evidence.fragile if decision.decides]
-    lines += [_motion_text(motion) for motion in evidence.motions]
+    for motion in evidence.motions:
+        along = f"{motion.item} along {_vector_text(motion.freedom.direction)}"
+        travel = f"{1e3 * motion.freedom.travel:.3g} mm, then {motion.freedom.hits}"
+        leaves = motion.freedom.leaves
+        lines.append(f"Free: {along} to infinity." if leaves else f"Local: {along} by {travel}.")
     return "\n".join(lines)
 
 
@@ -242,25 +259,11 @@ def _vector_text(vector: Sequence[float]) -> str:
     return f"({x:.3g}, {y:.3g}, {z:.3g})"
 
 
-def _motion_text(motion: Motion) -> str:
-    along = f"{motion.item} along {_vector_text(motion.freedom.direction)}"
-    if motion.freedom.leaves:
-        return f"Free: {along} to infinity."
-    return f"Local: {along} by {1e3 * motion.freedom.travel:.3g} mm, then {motion.freedom.hits}."
-
-
-def _thread_text(thread: Thread) -> str:
-    return (
-        f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
-        f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
-    )
-
-
-def _fragile_text(decision: Fragile) -> str:
+def _fragile_text(decision: FragileDecision) -> str:
     if decision.direction == "contact":
         what = "touch" if decision.value else "do not touch"
         claim = f"{decision.part} and {decision.other} {what}"
     else:
         what = "leaves" if decision.value else "does not leave"
         claim = f"{decision.part} {what} {decision.other} along {decision.direction}"
-    return f"Warning: the plan hangs on {1e3 * decision.margin:.2g} mm of tolerance: {claim}."
+    return f"Warning: the plan depends on {1e3 * decision.margin:.2g} mm of tolerance: {claim}."

@@ -1,9 +1,9 @@
-"""Which faces of two parts can hit each other along an axis: found by boxes, before any clipping.
+"""Broad phase: which faces of two parts can hit each other along an axis.
 
-A pair counts when the projections' bounding rectangles overlap and the up-face can lie above the
-down-face somewhere in that overlap. The second test bounds the height difference, a linear
-function, over the rectangle: it drops the faces of two surfaces that lie on each other, of which a
-finely tessellated fit has tens of thousands.
+A pair counts if the bounding rectangles of the projections overlap and the up-face can lie above
+the down-face somewhere in that overlap. The second test bounds the height difference, a linear
+function, over the rectangle: it discards the faces of two surfaces that lie on each other, of which
+a finely tessellated fit has tens of thousands.
 """
 
 from __future__ import annotations
@@ -16,8 +16,8 @@ import numpy as np
 from planning.feasibility.clipping import Polygons, triangle_overlaps
 from planning.feasibility.envelope import Faces
 
-DENSE = 400_000  # Up to so many pairs, comparing all with all is faster than a grid.
-ON_EDGE = 1e-12  # [m] A point on the edge of a face's box is in it.
+DENSE = 400_000  # Up to this many pairs, comparing all with all is faster than a grid.
+ON_EDGE = 1e-12  # [m] A point on the edge of a face's box counts as inside.
 FIRST_ROW, FIRST_COLUMN = 1, 2
 CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
 
@@ -28,7 +28,7 @@ class FacePairs:
 
     Attributes:
         down: Faces of the moving part that face against the direction.
-        up: Faces of the staying part that face along it.
+        up: Faces of the stationary part that face along it.
         d, u: (p,) indices into them.
         low, high: (p, 2) common rectangles [m].
     """
@@ -55,10 +55,10 @@ class FacePairs:
 
 
 def blocked_regions(several: Sequence[FacePairs], height: float) -> Polygons:
-    """Return where each up-face is above its down-face by more than a height [m].
+    """Return the regions in which each up-face is above its down-face by more than a height [m].
 
-    In the order of the pairs, empty where it is nowhere: one array for several pairs of parts,
-    since clipping few polygons takes as long as clipping many.
+    One polygon per pair, in order, possibly empty. Several pairs of parts go into one array, since
+    clipping few polygons takes as long as clipping many.
     """
     down = np.concatenate([pairs.down.corners[pairs.d] for pairs in several])
     up = np.concatenate([pairs.up.corners[pairs.u] for pairs in several])
@@ -108,11 +108,11 @@ def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
 
 
 def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
-    """Return the faces that can hit each other.
+    """Return the pairs of faces that can hit each other.
 
     Args:
         down: Faces of the moving part that face against the direction.
-        up: Faces of the staying part that face along it.
+        up: Faces of the stationary part that face along it.
         height: How far the up-face must rise above the down-face somewhere to count [m].
     """
     d, u = _near(down, up, height), _near(up, down, height)
@@ -163,14 +163,8 @@ def box_pairs(
     low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """Return the indices of rectangles that overlap, one of (n, 2) with one of (m, 2) each."""
-    search = _all_pairs if len(low_a) * len(low_b) <= DENSE else _grid_pairs
-    return search(low_a, high_a, low_b, high_b)
-
-
-def _all_pairs(
-    low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
-) -> tuple[np.ndarray, np.ndarray]:
-    """Find them by comparing all with all."""
+    if len(low_a) * len(low_b) > DENSE:
+        return _grid_pairs(low_a, high_a, low_b, high_b)
     mask = low_a[:, None, 0] < high_b[None, :, 0]
     mask &= high_a[:, None, 0] > low_b[None, :, 0]
     mask &= low_a[:, None, 1] < high_b[None, :, 1]
@@ -182,7 +176,7 @@ def _all_pairs(
 def _grid_pairs(
     low_a: np.ndarray, high_a: np.ndarray, low_b: np.ndarray, high_b: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Find them by sorting the rectangles into the cells of a grid over what both sides cover."""
+    """Find overlapping rectangles with a grid over the region that both sides cover."""
     origin = np.maximum(low_a.min(axis=0), low_b.min(axis=0))
     end = np.minimum(high_a.max(axis=0), high_b.max(axis=0))
     in_a, in_b = (
@@ -194,7 +188,11 @@ def _grid_pairs(
     low_a, high_a, low_b, high_b = low_a[in_a], high_a[in_a], low_b[in_b], high_b[in_b]
     low_a, low_b = np.maximum(low_a, origin), np.maximum(low_b, origin)
     high_a, high_b = np.minimum(high_a, end), np.minimum(high_b, end)
-    cell = _cell_size(low_a, high_a, low_b, high_b)
+    # Cells as small as possible while a face lies in few of them on average.
+    sizes = np.concatenate([high_a - low_a, high_b - low_b])
+    cell = max(float(np.sqrt(np.mean(np.prod(sizes, axis=1)))), 1e-9)
+    while np.prod(np.floor(sizes / cell) + 1.0, axis=1).mean() > CELLS_PER_FACE:
+        cell *= 1.5
     columns = int((end[1] - origin[1]) / cell) + 1
     face_a, cell_a, first_a = _cells_of((low_a - origin) / cell, (high_a - origin) / cell, columns)
     face_b, cell_b, first_b = _cells_of((low_b - origin) / cell, (high_b - origin) / cell, columns)
@@ -203,7 +201,7 @@ def _grid_pairs(
     start, stop = (np.searchsorted(cell_b, cell_a, side) for side in ("left", "right"))
     count = stop - start
     at_b = np.repeat(start, count) + _ranges(count)
-    # A pair meets in each cell that both lie in; the first of them, in row and column, keeps it.
+    # A pair is found in every cell that both lie in; only the first, by row and column, keeps it.
     own = np.flatnonzero((np.repeat(first_a, count) | first_b[at_b]) == (FIRST_ROW | FIRST_COLUMN))
     a, b = np.repeat(face_a, count)[own], face_b[at_b[own]]
     meet = (low_a[a] < high_b[b]) & (high_a[a] > low_b[b])
@@ -211,23 +209,13 @@ def _grid_pairs(
     return in_a[a[meet]], in_b[b[meet]]
 
 
-def _cell_size(*corners: np.ndarray) -> float:
-    """Return the edge of the grid's cells [m]: as small as keeps the faces in few cells each."""
-    low_a, high_a, low_b, high_b = corners
-    sizes = np.concatenate([high_a - low_a, high_b - low_b])
-    cell = max(float(np.sqrt(np.mean(np.prod(sizes, axis=1)))), 1e-9)
-    while np.prod(np.floor(sizes / cell) + 1.0, axis=1).mean() > CELLS_PER_FACE:
-        cell *= 1.5
-    return cell
-
-
 def _cells_of(
     low: np.ndarray, high: np.ndarray, columns: int
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return a face index and a cell number for each cell that each rectangle reaches into.
+    """Return face index, cell number and edge flags for each cell that each rectangle reaches.
 
-    And whether that cell is in the first row and the first column of those of the rectangle, as
-    ``FIRST_ROW`` and ``FIRST_COLUMN``, or-ed.
+    The flags, ``FIRST_ROW`` or ``FIRST_COLUMN`` or both, say whether the cell is in the first row
+    and column of the rectangle's cells.
     """
     first, last = low.astype(int), high.astype(int)
     span = last - first + 1

@@ -1,12 +1,12 @@
-"""Beyond the six directions: where a part can leave at an angle, and how far it can move at all.
+"""Slanted removal directions and local freedom: what the six directions do not cover.
 
-Candidates come from contact. Where two faces lie on each other, the incoming part cannot move
-against the target's normal there; the directions that all those normals allow form a cone, and its
-edges (along two contact faces at once), its faces' normals and the axes of threads are tried, first
-against contact, then exactly against the whole shapes, as for the six.
+Candidate directions come from contact. Where two faces lie on each other, the incoming part cannot
+move against the target's normal there. The directions that all those normals allow form a cone; its
+edges (along two contact faces at once), the normals of its faces and the axes of threads are tried,
+first against the contact normals, then exactly against the whole shapes, as for the six.
 
-Local freedom is something else: a part may move some way and then hit. It is the height by which
-the faces ahead of it are clear, over their common projection, and infinite only if the part leaves.
+Local freedom is the distance that a part can move before it hits something: the clearance to the
+faces ahead of it, over their common projection. It is infinite only if the part leaves.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ OPPOSED = 0.99  # Cosine of 8 degrees: facets of a coarse cylinder on a fine one
 ALONG = 0.01  # Sine of 0.6 degrees: sliding along a face, within its rounding.
 SAME_DIRECTION = 0.9998  # Cosine of 1 degree.
 MOST_NORMALS = 12  # Largest contact faces that candidates are made from.
-MOST_CANDIDATES = 60  # Tried exactly, best clear of the contact faces first.
+MOST_CANDIDATES = 60  # Tried exactly, those with the widest angle to the contact faces first.
 ROWS = 400_000  # Pairs of boxes compared at once: bounds the memory to some MB.
 
 
@@ -38,7 +38,7 @@ class Freedom:
 
     Attributes:
         direction: (3,) unit vector in A.
-        travel: Until they hit [m]; infinite if they leave altogether.
+        travel: Distance until they hit [m]; infinite if they leave altogether.
         hits: Name of the part that is hit; "" if they leave.
     """
 
@@ -63,30 +63,39 @@ def freedoms(
     Args:
         incoming: Parts that move as one.
         target: Parts that stay.
-        tolerance: Overlap that does not block, gap that still touches [m].
+        tolerance: Largest overlap that does not block and largest gap that counts as contact [m].
         axes: Further directions to try, for example of threads.
 
     Returns:
         Those of the six directions along which the parts can move further than the tolerance, then
         the slanted ones along which they leave; furthest first within each.
     """
-    six = [motion(incoming, target, unit_vector(j), tolerance) for j in DIRECTIONS]
+    six = [freedom_along(incoming, target, unit_vector(j), tolerance) for j in DIRECTIONS]
     moving = [freedom for freedom in six if freedom.travel > tolerance]
     normals = contact_normals(incoming, target, tolerance)
     slanted = [
-        motion(incoming, target, direction, tolerance)
+        freedom_along(incoming, target, direction, tolerance)
         for direction in candidates(normals, np.array(axes, float).reshape(-1, 3))
     ]
     leaving = [freedom for freedom in slanted if freedom.leaves]
     return sorted(moving, key=lambda f: -f.travel) + leaving
 
 
-def motion(
+def freedom_along(
     incoming: Sequence[Solid], target: Sequence[Solid], direction: np.ndarray, tolerance: float
 ) -> Freedom:
     """Return how far parts can move along one direction (3,)."""
-    R = _rotation_to_z(direction)
-    views = [[_turned(solid, R) for solid in solids] for solids in (incoming, target)]
+    side = np.eye(3)[int(np.abs(direction).argmin())]
+    across = np.cross(side, direction)
+    across /= np.linalg.norm(across)
+    R = np.array([across, np.cross(direction, across), direction])  # Brings the direction to +z.
+    views = [
+        [
+            envelope(Solid(s.name, s.vertices @ R.T, s.faces, s.mass, R @ s.p_AoG), axis=2)
+            for s in solids
+        ]
+        for solids in (incoming, target)
+    ]
     x, y, z = (float(value) for value in direction)
     furthest = Freedom((x, y, z), np.inf, "")
     for moving in views[0]:
@@ -101,7 +110,7 @@ def motion(
 
 
 def travel_along(moving: Envelope, staying: Envelope, tolerance: float) -> float:
-    """Return how far a part moves up before it hits another in its way [m]; 0 if at once."""
+    """Return how far a part moves up before it hits another one above it [m]."""
     pairs = overlapping_faces(moving.up, staying.down)
     if not len(pairs):
         return 0.0
@@ -118,7 +127,7 @@ def contact_normals(
 ) -> np.ndarray:
     """Return outward normals (n, 3) of the target where the incoming parts lie on it, widest first.
 
-    Normals within a degree of each other are one.
+    Normals within a degree of each other are merged.
     """
     found, areas = [np.zeros((0, 3))], [np.zeros(0)]
     for a in incoming:
@@ -131,11 +140,11 @@ def contact_normals(
 
 
 def candidates(normals: np.ndarray, axes: np.ndarray) -> np.ndarray:
-    """Return directions (n, 3) that no contact normal forbids, without the six.
+    """Return directions (n, 3) that no contact normal forbids, other than the six.
 
     Args:
         normals: (k, 3) directions against which the parts cannot move.
-        axes: (m, 3) further ones to try, both ways.
+        axes: (m, 3) further directions to try, both ways.
     """
     chosen = normals[:MOST_NORMALS]
     edges = [np.cross(a, b) for a, b in combinations(chosen, 2)]
@@ -192,16 +201,3 @@ def _distinct(directions: np.ndarray, weights: np.ndarray) -> np.ndarray:
         if not len(kept) or (kept @ direction).max() < SAME_DIRECTION:
             kept = np.vstack([kept, direction])
     return kept
-
-
-def _rotation_to_z(direction: np.ndarray) -> np.ndarray:
-    """Return a rotation (3, 3) that brings a unit vector to +z."""
-    side = np.eye(3)[int(np.abs(direction).argmin())]
-    x = np.cross(side, direction)
-    x /= np.linalg.norm(x)
-    return np.array([x, np.cross(direction, x), direction])
-
-
-def _turned(solid: Solid, R: np.ndarray) -> Envelope:
-    turned = Solid(solid.name, solid.vertices @ R.T, solid.faces, solid.mass, R @ solid.p_AoG)
-    return envelope(turned, 2)

@@ -1,14 +1,15 @@
 """Interference-free matrices M_j: which part can leave along j without hitting which other part.
 
-Part i moved along +d to infinity hits part k, which stays, exactly when over some point p of the
-plane across d the top of k lies above the bottom of i. Only i's down-faces and k's up-faces matter,
-nothing is stepped, faces that slide on each other do not block, and since the same pair (i below,
-k above) is met by moving k along -d, M_-d is the transpose of M_+d: three axes suffice.
+Part i, moved along +d to infinity, hits the stationary part k exactly if, over some point p of the
+plane perpendicular to d, the top of k lies above the bottom of i. Only i's down-faces and k's
+up-faces matter, the motion is not discretised, and faces that slide on each other do not block.
+Moving k along -d meets the same pair of faces, so M_-d is the transpose of M_+d: three axes
+suffice.
 
-Blocked is what blocks by more than a tolerance: the region of p where the tops exceed the bottoms
-by more than ``FIT_TOLERANCE`` must be wide enough for a disc of that radius. So a shaft drawn line
-to line with its hole, or a bolt with its thread, leaves along its axis although the facets of the
-two surfaces cross by their sagitta.
+A part blocks only by more than a tolerance: the region of p where the tops exceed the bottoms by
+more than ``FIT_TOLERANCE`` must be wide enough for a disc of that radius. So a shaft drawn line to
+line with its hole, or a bolt with its thread, leaves along its axis although the facets of the two
+surfaces cross by their sagitta.
 """
 
 from __future__ import annotations
@@ -36,10 +37,10 @@ class Blocker:
 
     Attributes:
         moving: Name of the part that is moved.
-        staying: Name of the part that it hits.
+        staying: Name of the stationary part that it hits.
         direction: In A, "+x" ... "-z".
-        p_AoQ: Point of the staying part that is hit [m].
-        travel: How far the moving part gets before it hits at that point [m].
+        p_AoQ: Point of the stationary part that is hit [m].
+        travel: Distance that the moving part travels until it hits at that point [m].
     """
 
     moving: str
@@ -62,11 +63,10 @@ class Interference:
 
     Attributes:
         free: Per direction j an (n, n) int matrix M_j: M_j[i, k] = 1 if part i moved along j to
-            infinity does not hit part k, which stays; diagonals 0.
+            infinity does not hit the stationary part k; diagonals 0.
         blockers: One per 0 off the diagonals.
-        margin: Per direction an (n, n) float matrix [m]: by how much the tolerance can change, up
-            or down, before the decision flips; what is ``FRAGILE`` of the tolerance or more is
-            given as that.
+        margin: Per direction an (n, n) float matrix [m]: change of the tolerance, up or down, at
+            which the decision flips, capped at ``FRAGILE`` times the tolerance.
     """
 
     free: Mapping[str, np.ndarray]
@@ -75,7 +75,7 @@ class Interference:
 
 
 def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> Interference:
-    """Return the six matrices M_j of n parts in matrix order."""
+    """Return the six matrices M_j of n parts in matrix order; the tolerance is in [m]."""
     count = len(solids)
     free = {j: 1 - np.eye(count, dtype=int) for j in DIRECTIONS}
     margin = {j: np.full((count, count), FRAGILE * tolerance) for j in DIRECTIONS}
@@ -99,7 +99,7 @@ def first_hit(
 
     Args:
         moving: Envelope along the axis of the direction.
-        staying: The same for the part that stays.
+        staying: The same for the stationary part.
         direction: "+x", "+y" or "+z".
         tolerance: Height of overlap and radius of the region that do not count [m].
     """
@@ -114,7 +114,7 @@ def _evidence(
     decided: Mapping[tuple[int, int], Decision],
     tolerance: float,
 ) -> Iterator[Blocker]:
-    """Yield where a part is hit, for each decision that has a blocked point."""
+    """Yield the point that is hit, for each pair that is blocked."""
     points = {parts: d.point for parts, d in decided.items() if d.point is not None}
     seen = list(PLANE[axis_index(direction)])
     floors = _heights([view.up for view in views], points, 0)
@@ -122,7 +122,7 @@ def _evidence(
     tops = _heights([view.up for view in views], points, 1)
     for (i, k), point in points.items():
         height, travel = _nearest(floors[i, k], ceilings[i, k], tolerance)
-        if not np.isfinite(travel):  # Over this point the two share volume: they start blocked.
+        if not np.isfinite(travel):  # The two share volume over this point: no free travel.
             height, travel = float(np.max(tops[i, k], initial=views[k].low[2])), 0.0
         p_AoQ = np.empty(3)
         p_AoQ[seen] = [*point, height]
@@ -133,7 +133,7 @@ def _evidence(
 def _heights(
     faces: Sequence[Faces], points: Mapping[tuple[int, int], np.ndarray], place: int
 ) -> dict[tuple[int, int], np.ndarray]:
-    """Return the heights of faces over each pair's point, of the pair's part at place 0 or 1."""
+    """Return the heights over each pair's point, of the faces of its part at place 0 or 1."""
     own: dict[int, list[tuple[int, int]]] = {}
     for parts in points:
         own.setdefault(parts[place], []).append(parts)
@@ -145,12 +145,12 @@ def _heights(
 
 
 def _nearest(floors: np.ndarray, ceilings: np.ndarray, tolerance: float) -> tuple[float, float]:
-    """Return the height of the face that is hit and the travel to it [m]; infinite if none is.
+    """Return height and distance of the nearest ceiling above any floor [m]; infinity if none.
 
     Args:
         floors: Heights of the moving part's up-faces over a point [m].
-        ceilings: Heights of the staying part's down-faces over it [m].
-        tolerance: By how much they may overlap [m].
+        ceilings: Heights of the stationary part's down-faces over it [m].
+        tolerance: Overlap that does not count [m].
     """
     gaps = ceilings[None] - floors[:, None]
     ahead = np.where(gaps >= -tolerance, gaps, np.inf)

@@ -1,4 +1,4 @@
-"""An assembly order: checked against the product, and what is there of it as words."""
+"""Input validation of an assembly order, and the name of a sub-assembly."""
 
 from __future__ import annotations
 
@@ -8,20 +8,24 @@ from collections.abc import Sequence
 from cell.errors import BadOrder
 from cell.products.product import Product
 
-MOST_NAMED = 6  # More would hide the sentence that they are in.
+MOST_NAMED = 6  # More names would obscure the sentence around them.
 
 
-def together(names: Sequence[str]) -> str:
-    """Return a sub-assembly as words: all of its names, or the first and how many more."""
+def subassembly_name(names: Sequence[str]) -> str:
+    """Return the names of a sub-assembly's items: all, or the first and how many more."""
     if len(names) <= MOST_NAMED:
         return " + ".join(names)
     return f"{names[0]} + {len(names) - 1} others"
 
 
 def check_order(product: Product, order: tuple[str, ...]) -> None:
-    """Refuse an order with an unknown part or group, or that does not list each part once.
+    """Check that an order lists each part of a product exactly once.
 
-    A group may be given by its name or, in its place, by all its parts.
+    A group may be given by its name or by all its parts.
+
+    Raises:
+        UnknownName: The order names a part or group that does not exist.
+        BadOrder: It has an empty item, repeats a part or lacks one.
     """
     if not all(order) or not order:
         raise BadOrder(f"Order '{','.join(order)}' has an empty item; write it like a,b,c.")
@@ -29,16 +33,12 @@ def check_order(product: Product, order: tuple[str, ...]) -> None:
     repeated = [part for part, count in listed.items() if count > 1]
     missing = [part for part in product.parts if part not in listed]
     if repeated or missing:
-        raise BadOrder(_complaint(product, order, repeated, missing))
-
-
-def _complaint(
-    product: Product, order: tuple[str, ...], repeated: list[str], missing: list[str]
-) -> str:
-    faults = [f"repeats {', '.join(_as_items(product, repeated))}"] if repeated else []
-    faults += [f"lacks {', '.join(_as_items(product, missing))}"] if missing else []
-    needed = ", ".join(product.items())
-    return f"Order '{','.join(order)}' {' and '.join(faults)}. It must list once each: {needed}."
+        faults = [f"repeats {', '.join(_as_items(product, repeated))}"] if repeated else []
+        faults += [f"lacks {', '.join(_as_items(product, missing))}"] if missing else []
+        needed = ", ".join(product.items())
+        raise BadOrder(
+            f"Order '{','.join(order)}' {' and '.join(faults)}. It must list once each: {needed}."
+        )
 
 
 def _as_items(product: Product, parts: list[str]) -> list[str]:

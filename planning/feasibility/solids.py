@@ -1,4 +1,4 @@
-"""Parts in their assembled poses, as the planner's geometry queries need them."""
+"""Parts in their assembled poses, with what the geometry queries of the planner need."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def solids_of(product: Product) -> dict[str, Solid]:
 
 
 def boxes_apart(a: Solid, b: Solid, gap: float) -> bool:
-    """Say whether the bounding boxes are further apart than the gap [m] along some axis."""
+    """Return whether the bounding boxes are further apart than the gap [m] along some axis."""
     return bool(np.any(a.lower - b.upper > gap) or np.any(b.lower - a.upper > gap))
 
 

@@ -1,1 +1,1 @@
-"""How well the jig would hold a candidate: footprint, imprint, capacity, room for the gripper."""
+"""How well the jig would hold a candidate body: support, grip, imprint, capacity, and the score."""

@@ -1,68 +1,118 @@
-"""The values of the general rule: what it is told, and what it says of a candidate and a step."""
+"""The values of the general rule: its inputs, and its assessment of a candidate and of a step."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from cell.configuration.config import CellConfig
+from cell.errors import InputError
 from cell.fixtures.soft_jig import JigParameters
+from cell.machines.grippers import GRIPPER_MODELS
+from planning.feasibility.directions import axis_index
 
 CRITERIA: Mapping[str, str] = {
     "reach": "1 if the moved part comes from above, 1/2 from the side",
-    "stability": "angle by which the centre of gravity could lean, of 90 degrees; the lower of the "
-    "body alone and with the moved part on it",
-    "footprint": "share of the bag's diameter that is left beside the footprint",
+    "stability": "angle by which the centre of gravity can tilt before it leaves the support area, "
+    "of 90 degrees; the lower of the body alone and with the moved part on it",
+    "footprint": "share of the bag's diameter that the footprint leaves free",
     "imprint": "share of the bag's depth that is left below the body",
-    "holding": "m / (1 + m), m: force it bears across, per force that the operation exerts across",
-    "gripper": "share of the gripper's stroke that is left over the widest of what must be "
-    "gripped; 0 also for jaws made wider than it",
-    "continuity": "1 if the jig holds the body in this posture already, or holds nothing yet",
+    "holding": "m / (1 + m), m: sideways force it withstands, per sideways force of the operation",
+    "gripper": "share of the gripper's stroke that is left at the largest grip width; 0 also for "
+    "jaws made for more than the stroke",
+    "continuity": "1 if the jig already holds the body in this posture, or holds nothing yet",
 }
 """What the scores of a candidate mean, each from 0 to 1."""
 
 
 @dataclass(frozen=True)
-class Setup:
-    """What the general rule has to know of the cell.
+class FixtureSetup:
+    """The parts of a cell's configuration that decide how well a body can be fixed.
 
     Attributes:
         jig: Bag, beads, vacuum, frozen bed.
-        press_force: That a body is pressed on the jig with [N].
+        press_force: Force with which a body is pressed into the jig [N].
         insertion_force: Largest force along an insertion [N].
         driver_force: Thrust of the screwdriver [N].
+        gripper_stroke: Largest opening of the gripper, or of the widest one [m].
     """
 
     jig: JigParameters
     press_force: float
     insertion_force: float
     driver_force: float
+    gripper_stroke: float
 
     @staticmethod
-    def of(config: CellConfig) -> Setup:
-        """Return what a configuration says."""
-        return Setup(
+    def of(config: CellConfig) -> FixtureSetup:
+        """Return the setup that a configuration describes.
+
+        Raises:
+            InputError: No arm carries a gripper.
+        """
+        tools = [arm.tool for arm in config.arms.values()]
+        strokes = [GRIPPER_MODELS[tool].stroke for tool in tools if tool in GRIPPER_MODELS]
+        if not strokes:
+            known = ", ".join(GRIPPER_MODELS)
+            raise InputError(f"No arm carries a gripper; set arms.NAME.tool to one of {known}.")
+        return FixtureSetup(
             config.jig,
             config.placement.press_force,
             config.insertion.force_limit,
             config.driver.push_force,
+            max(strokes),
         )
 
 
 @dataclass(frozen=True)
-class Candidate:
-    """One way to hold the product for a step.
+class Proposal:
+    """One way to hold the product during a step, not evaluated yet.
 
     Attributes:
-        name: Items that the jig holds, as words.
+        name: Names of the items on the jig, as words.
+        body: Names of their parts.
+        moved: Names of the parts that are brought to them.
+        directions: Along which the moved parts leave the body.
+        up: Axis of the product frame that points up.
+        held: Whether the jig already holds this body in this posture.
+        empty: Whether the jig holds nothing yet.
+    """
+
+    name: str
+    body: tuple[str, ...]
+    moved: tuple[str, ...]
+    directions: Sequence[str]
+    up: str
+    held: bool
+    empty: bool
+
+    @property
+    def sideways(self) -> list[str]:
+        """Those of the directions that are horizontal on the jig."""
+        return [j for j in self.directions if axis_index(j) != axis_index(self.up)]
+
+    @property
+    def approach(self) -> str:
+        """Where the moved parts come from: "above" if possible, else "the side", else "below"."""
+        if self.up in self.directions:
+            return "above"
+        return "the side" if self.sideways else "below"
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """One way to hold the product during a step, evaluated.
+
+    Attributes:
+        name: Names of the items on the jig, as words.
         body: Names of their parts.
         moved: Names of the parts that are brought to them.
         up: Axis of the product frame that points up on the jig.
         approach: Where the moved parts come from, seen on the jig: "above", "the side" or "below".
-        figures: What was found, SI units in the names; as far as it was looked at.
+        figures: What was computed before it was rejected, if it was; SI units in the names.
         scores: Per criterion from 0 to 1; empty if rejected.
         rejected: Why it cannot be used; "" if it can.
-        notes: What has to be provided for.
+        notes: What else has to be provided for it.
     """
 
     name: str
@@ -88,12 +138,12 @@ class Candidate:
 
 @dataclass(frozen=True)
 class Choice:
-    """What the general rule says of one step.
+    """The general rule's ranking of the candidates of one step.
 
     Attributes:
-        item: The item of the order that comes in.
+        item: The item of the order that is added.
         candidates: Best first, the rejected ones last.
-        paper: Place of Algorithm 1's choice among them.
+        paper: Index of Algorithm 1's choice among them.
         verdict: Whether both rules agree, in a sentence.
     """
 

@@ -1,4 +1,4 @@
-"""What a body stands on: the outline of what reaches into the bed, seen from above."""
+"""Footprint of a body: the convex outline of what it stands on, seen from above."""
 
 from __future__ import annotations
 
@@ -9,32 +9,18 @@ import numpy as np
 import trimesh
 from scipy.spatial import ConvexHull, QhullError
 
-from planning.feasibility.directions import axis_index, unit_vector
-
-# [M] In the twin, 20 N press the end of the standing motor's can this deep; a body stands on what
-# is lower than this above its lowest point.
+# [m] [M] Depth to which 20 N press the end of the standing motor's can in simulation. A body stands
+# on what is less than this above its lowest point.
 USUAL_DEPTH = 0.008
-
-
-def posture(up: str) -> np.ndarray:
-    """Return R_JA (3, 3): the product turned so that its axis ``up`` points up on the jig.
-
-    "+z" is no turn; the others are the shortest turn, and "-z" is about x.
-    """
-    axis = unit_vector(up)
-    if up == "-z":
-        return np.diag([1.0, -1.0, -1.0])
-    x = unit_vector("+x") if axis_index(up) != 0 else -np.sign(axis[0]) * unit_vector("+z")
-    return np.stack([x, np.cross(axis, x), axis])
 
 
 @dataclass(frozen=True, eq=False)
 class Footprint:
-    """Convex outline of what a body stands on.
+    """Convex outline of the points that a body stands on.
 
     Attributes:
         corners: (k, 2) counter-clockwise [m].
-        edges: (k, 3) lines n . p + c = 0 with unit normals n that point outwards.
+        edges: (k, 3) lines n . p + c = 0 with unit outward normals n.
     """
 
     corners: np.ndarray
@@ -45,7 +31,7 @@ class Footprint:
         return float(-(self.edges[:, :2] @ point + self.edges[:, 2]).max())
 
     def lever(self, point: np.ndarray, direction: np.ndarray) -> float:
-        """Return how far a point (2,) is behind the edge over which a push tips [m].
+        """Return the distance of a point (2,) from the edge over which a push tips the body [m].
 
         Args:
             point: (2,).
@@ -77,7 +63,7 @@ def footprint(points: np.ndarray) -> Footprint | None:
         return None
     try:
         hull = ConvexHull(points)
-    except QhullError:  # All on a line: nothing stands on that.
+    except QhullError:  # Collinear points.
         return None
     return Footprint(points[hull.vertices], hull.equations)
 

@@ -1,11 +1,11 @@
-"""How a body sinks into the soft bed, and the imprint it leaves: the cell's own bed model, slowly.
+"""How a body sinks into the soft bed, and its imprint: quasi-static, with the cell's bed model.
 
-The body is pushed straight down into a freshly inflated bag until the bed bears the press force.
-The posture is kept, as a hand keeps it. The bed is that of the twin on the twin's own grid, with
-longer steps: the bed raises its collar and its strength after each, so that the force lags behind
-by one, and the step before each look at the force is short. Under 20 N the motor standing on its
-terminals sinks 15.9 mm; in the twin 16.3 mm, tilted by 1.7 degrees, under the hand on a carriage,
-and 14.4 mm under the arm, which stops at the first 20 N that it feels. [M]
+The body is pushed straight down into a freshly inflated bag until the bed bears the press force,
+without tilting. Bed model and grid are those of the simulation, the steps are longer. The bed
+updates its collar and its strength after each step, so that the force lags by one step; a short
+step therefore precedes each reading of the force. Under 20 N the motor standing on its terminals
+sinks 15.9 mm; in simulation 16.3 mm, tilted by 1.7 degrees, under the hand on a carriage, and
+14.4 mm under the arm, which stops at the first 20 N that it measures. [M]
 """
 
 from __future__ import annotations
@@ -24,13 +24,13 @@ from planning.feasibility.solids import Solid
 from planning.fixture_analysis.footprint import Footprint, footprint
 
 SHORTEST, LONGEST = 0.0002, 0.008  # [m] [D] Steps: the last decides the depth's error.
-SHARE = 0.4  # Of the way that the force still asks for, judged by the last step, taken in the next.
-PAST = 1.02  # A step that ends beyond so much of the force is taken back and halved.
-BEARING = 0.0005  # [m] [A] What the bed springs back by: less than that apart bears.
-SPACING = 0.0005  # [m] [D] 9 points per cell of 1.5 mm: hardly any under a body gets none.
+SHARE = 0.4  # Share of the extrapolated remaining depth that the next step takes.
+OVERSHOOT = 1.02  # A step that ends above this multiple of the force is repeated at half the size.
+BEARING = 0.0005  # [m] [A] Elastic recovery of the bed: surfaces less than that apart bear.
+SPACING = 0.0005  # [m] [D] 9 points per cell of 1.5 mm: hardly any cell under a body has none.
 NARROW = 0.008  # [m] [A] Beads of 1 mm under a membrane of 1 mm do not rise into such a hole.
 FEWEST = 500  # Points of a small part.
-SPEED = 0.010  # [m/s] [A] of the hand; the bed hardly depends on it.
+SPEED = 0.010  # [m/s] [A] Of the hand; the bed hardly depends on it.
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +38,20 @@ class Imprint:
     """A body pressed into the bed; the origin of the plane is the middle of the bag.
 
     Attributes:
-        depth: Of the lowest point below the apex of the bare bag [m].
+        depth: Of the lowest point below the apex of the undisturbed bag [m].
         force: That the bed bears [N]; below the press force if the body reached the base plate.
-        volume: Of the imprint below the bare bag [m3].
-        homeless: Volume of beads that found no room beside the body [m3].
+        volume: Of the imprint below the surface of the undisturbed bag [m3].
+        excess: Volume of displaced beads that the bed around the body could not take up [m3].
         cell: Edge of a cell [m].
         bed: (n, n) height of the bed above the body's lowest point, collar included [m].
         under: (n, n) height of the body's underside above its lowest point [m]; inf where none.
-        contact: Outline of what bears, or None if it spans no area.
+        contact: Outline of the bearing area, or None if it has no extent.
     """
 
     depth: float
     force: float
     volume: float
-    homeless: float
+    excess: float
     cell: float
     bed: np.ndarray
     under: np.ndarray
@@ -59,14 +59,15 @@ class Imprint:
 
     @property
     def contact_area(self) -> float:
-        """Of what bears, seen from above [m2]."""
+        """Bearing area, seen from above [m2]."""
         return float((self.under < self.bed + BEARING).sum()) * self.cell**2
 
     def walls(self, direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Return height [m] and lower edge above the lowest point [m] of the walls ahead of a push.
+        """Return heights [m] and lower edges [m] of the imprint's walls ahead of a push.
 
-        A wall stands between a cell that the body fills and the next one along the push, as high
-        as bed or overhanging underside there reaches above the body's underside.
+        A wall is between a cell that the body fills and the next one along the push; it reaches
+        from the body's underside up to the bed, or to an overhanging underside, in that cell.
+        Lower edges are above the body's lowest point.
 
         Args:
             direction: (2,) along an axis of the plane.
@@ -83,9 +84,9 @@ class Imprint:
 
 
 def depth_in_bed(
-    imprint: Imprint, part: Surface, R_JA: np.ndarray, p_middle: np.ndarray, low: float
+    imprint: Imprint, part: PartSurface, R_JA: np.ndarray, p_middle: np.ndarray, low: float
 ) -> float:
-    """Return how deep a part that joins the body would be inside the frozen bed [m].
+    """Return how deep a part that is added to the body would penetrate the frozen bed [m].
 
     Args:
         imprint: Of the body.
@@ -98,7 +99,7 @@ def depth_in_bed(
     half = (len(imprint.bed) - 1) // 2
     at = np.rint(points[:, :2] / imprint.cell).astype(int) + half
     inside = np.all((at >= 0) & (at < len(imprint.bed)), axis=1)
-    # The height field stands up in every hole of the body; a bag does not enter narrow ones.
+    # The height field rises into every hole of the body; a real bag does not enter narrow ones.
     bulging = ndimage.grey_opening(imprint.bed, size=round(NARROW / imprint.cell))
     bed, under = (height[tuple(at[inside].T)] for height in (bulging, imprint.under))
     below = np.minimum(bed, under) - points[inside, 2]  # Above the body there is no bed.
@@ -106,12 +107,12 @@ def depth_in_bed(
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """Points spread over a part's surface, and what of them looks down in postures asked for.
+class PartSurface:
+    """Points spread over a part's surface, and a cache of those that face down per posture.
 
     Attributes:
         samples: In the product frame A.
-        below: Per posture and cell the points that look down, turned, and one of them per cell.
+        below: Per posture and cell size the points that face down, turned, and one per cell.
     """
 
     samples: SurfaceSamples
@@ -119,8 +120,8 @@ class Surface:
         default_factory=dict
     )
 
-    def seen_from_below(self, R_JA: np.ndarray, cell: float) -> tuple[np.ndarray, SurfaceSamples]:
-        """Return points (m, 3) that look down in a posture, turned, and one of them per cell."""
+    def facing_down(self, R_JA: np.ndarray, cell: float) -> tuple[np.ndarray, SurfaceSamples]:
+        """Return points (m, 3) that face down in a posture, turned, and one sample per cell."""
         key = R_JA.tobytes(), cell
         if key not in self.below:
             own = self.samples
@@ -131,19 +132,19 @@ class Surface:
         return self.below[key]
 
 
-def samples_of(solid: Solid) -> Surface:
-    """Return points spread over a part's surface in the product frame A, the same every time."""
+def samples_of(solid: Solid) -> PartSurface:
+    """Return points spread over a part's surface in the product frame A, with a fixed seed."""
     mesh = trimesh.Trimesh(solid.vertices, solid.faces, process=False)
     count = max(FEWEST, round(mesh.area / SPACING**2))
     sampled = trimesh.sample.sample_surface(mesh, count, seed=0)
     points, faces = sampled[0], sampled[1]
     areas = np.full(count, mesh.area / count)
     normals = mesh.face_normals[faces]
-    return Surface(SurfaceSamples(solid.name, points, normals, areas))
+    return PartSurface(SurfaceSamples(solid.name, points, normals, areas))
 
 
 def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
-    """Return what a turned surface shows to the bed, as the bed sees it."""
+    """Return a turned surface as the bed model samples it."""
     if not len(samples.points):
         return samples
     under = samples.underside(np.eye(3), cell)
@@ -154,7 +155,7 @@ def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
 
 
 def press(
-    parts: Iterable[Surface],
+    parts: Iterable[PartSurface],
     R_JA: np.ndarray,
     p_middle: np.ndarray,
     jig: JigParameters,
@@ -167,35 +168,33 @@ def press(
         R_JA: (3, 3) posture.
         p_middle: (2,) point of the turned body, in the plane, that goes to the middle of the bag.
         jig: Bag and beads.
-        force: That ends the pressing [N].
+        force: At which the pressing ends [N].
     """
-    seen = [part.seen_from_below(R_JA, jig.bag.cell) for part in parts]
+    seen = [part.facing_down(R_JA, jig.bag.cell) for part in parts]
     points = np.concatenate([points for points, _ in seen])
+    samples = [under for _, under in seen]
+    body = SurfaceSamples(
+        "body",
+        np.concatenate([part.points for part in samples]),
+        np.concatenate([part.normals for part in samples]),
+        np.concatenate([part.areas for part in samples]),
+    )
     lowest = float(points[:, 2].min())
     points = points[points[:, 2] <= lowest + jig.bag.cap_height]
-    bed, apex = _bed(jig), jig.bag.cap_height
+    bed, apex = _bed_of(jig), jig.bag.cap_height
     bed.inflate()
     cap = bed.heights.copy()
-    pushed = _Pushed(bed, _joined([under for _, under in seen]), p_middle, apex - lowest)
-    depth, borne = pushed.down_to(force, apex - jig.bag.floor)
-    return _read(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
-
-
-def _joined(parts: list[SurfaceSamples]) -> SurfaceSamples:
-    """Return the surfaces of several parts as one."""
-    points, normals, areas = (
-        np.concatenate([getattr(part, field) for part in parts])
-        for field in ("points", "normals", "areas")
-    )
-    return SurfaceSamples("body", points, normals, areas)
+    descent = _Descent(bed, body, p_middle, apex - lowest)
+    depth, borne = descent.down_to(force, apex - jig.bag.floor)
+    return _imprint(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
 
 
 @dataclass(frozen=True, eq=False)
-class _Pushed:
-    """A body on its way down into a bed.
+class _Descent:
+    """A body that is pushed down into a bed.
 
     Attributes:
-        bed: That it is pushed into.
+        bed: Freshly inflated.
         body: Its surface, turned.
         p_middle: (2,) point of it over the middle of the bag [m].
         height: Of the body's frame when it just touches the apex [m].
@@ -215,7 +214,7 @@ class _Pushed:
             if step > SHORTEST:
                 self._bears(depth + step - SHORTEST, step - SHORTEST)
             now = self._bears(depth + step, min(step, SHORTEST))
-            if now > PAST * force and step > SHORTEST:
+            if now > OVERSHOOT * force and step > SHORTEST:
                 self.bed.restore(before)
                 step = max(step / 2, SHORTEST)
                 continue
@@ -234,18 +233,18 @@ class _Pushed:
 
 
 @cache
-def _bed(jig: JigParameters) -> Bed:
-    """Return one bed for all imprints of a jig: it is inflated anew for each."""
+def _bed_of(jig: JigParameters) -> Bed:
+    """Return one bed for all imprints of a jig; it is re-inflated for each."""
     return Bed(jig.bag, jig.soil)
 
 
-def _read(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
-    """Take over the bed's surface and the body's underside over it.
+def _imprint(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
+    """Return the imprint: the bed's surface and the body's underside above it.
 
     Args:
         bed: After the push.
         cap: (n, n) its surface before [m].
-        points: (m, 3) of the body that look down, in J.
+        points: (m, 3) points of the body that face down, in J.
         depth: Of the lowest point below the apex [m].
         borne: What the bed bears [N].
     """

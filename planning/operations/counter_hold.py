@@ -31,7 +31,7 @@ def hold(station: Station, part: str) -> Generator[Phase, Outcome, Grasp]:
 
     Its belief is fresh. `planning.operations.grasping.let_go` lets go of it.
     """
-    arm, gripper = station.holder, station.holder.tool
+    arm, gripper = station.holder, station.cell.gripper
     reach = first(_from_the_side(station, part), part, station)
     yield Phase(
         HoldPhase.APPROACH,

@@ -155,7 +155,7 @@ def seize(
     station: Station, part: str, reach: Reach, riders: tuple[str, ...] = ()
 ) -> Iterator[Phase]:
     """Yield the phases after which a part is in the hand, where it stands."""
-    arm, gripper = station.holder, station.holder.tool
+    arm, gripper = station.holder, station.cell.gripper
     yield Phase(
         HandPhase.APPROACH,
         motion_finished,
@@ -178,7 +178,7 @@ def grip(
     station: Station, part: str, grasp: Grasp, awake: frozenset[str] = frozenset()
 ) -> Generator[Phase, Outcome, None]:
     """Yield the phase that closes the jaws; fails if they find nothing in between."""
-    gripper = station.holder.tool
+    gripper = station.cell.gripper
     opening = tip_opening(gripper.model, grasp)
 
     def at_rest(sensed: Sensed) -> bool:
@@ -232,7 +232,7 @@ def let_go(
         retreat: How far the hand backs off [m].
         awake: Names of the parts that are awake until the jaws are clear.
     """
-    arm, gripper = station.holder, station.holder.tool
+    arm, gripper = station.holder, station.cell.gripper
     yield Phase(
         HandPhase.RELEASE,
         after(RELEASE_TIME),

@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from planning.feasibility.directions import rotation_with_up
 from planning.motion.kinematics import Unreachable, ik_solutions
 from planning.motion.paths import NoPath, plan_line
 from planning.operations.grasping import Reach, backed_off
@@ -32,15 +33,7 @@ def anywhere(X_WP: RigidTransform) -> bool:
 
 def upright(up: str, yaw: float) -> RotationMatrix:
     """Return R_WA that turns the product's ``up`` axis ("+z" ...) to +z of W, then by ``yaw``."""
-    axis = np.zeros(3)
-    axis["xyz".index(up[1])] = 1.0 if up[0] == "+" else -1.0
-    turn = RotationMatrix.MakeZRotation(yaw)
-    if np.allclose(axis, [0, 0, -1]):
-        return turn @ RotationMatrix.MakeXRotation(np.pi)
-    side = np.array([1.0, 0.0, 0.0]) if abs(axis[0]) < 0.5 else np.array([0.0, 1.0, 0.0])
-    other = np.cross(axis, side)
-    # Rows are the axes of W seen from A.
-    return turn @ RotationMatrix(np.array([side, other, axis]))
+    return RotationMatrix.MakeZRotation(yaw) @ rotation_with_up(up)
 
 
 def pose_on_jig(station: Station, part: str, up: str, yaw: float, height: float) -> RigidTransform:

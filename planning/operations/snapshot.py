@@ -89,7 +89,7 @@ def take_snapshot(simulation: Simulation) -> Snapshot:
         X_HF={bolt: cell.threads[bolt].X_HF(context) for bolt in cell.threads},
         turns={bolt: float(cell.threads.turns(root, bolt)) for bolt in cell.threads},
         clamp={bolt: cell.threads[bolt].clamp_force(context) for bolt in cell.threads},
-        spindle_torque=cell.driver.tool.read(context).torque,
+        spindle_torque=cell.screwdriver.read(context).torque,
         wrenches=wrenches,
         hand_clearance={fit.shaft: _distance(cell, query, fit.shaft) for fit in cell.product.fits},
     )

@@ -6,59 +6,25 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from pydrake.geometry import SceneGraph
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
 from pydrake.multibody.tree import Frame, SpatialInertia
 from pydrake.systems.framework import Context
 
 from cell.builder import Cell
 from cell.configuration.config import CellConfig
 from cell.machines.arm import Arm
-from cell.machines.devices import add_arms, make_drives
-from cell.machines.workcell import add_workcell
 from cell.products.product import Part
-from cell.workpieces.parts import add_parts
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
 from planning.motion.kinematics import Unreachable, ik_solutions, tool_pose
 from planning.motion.paths import plan_line, plan_path
 from planning.motion.timing import JointMotion, time_path
+from planning.operations.planning_copy import collision_model
 from planning.perception.belief import Belief, Source, State
 
 FINE_CLEARANCE = 5e-4  # Kept next to neighbours of a hole; smaller than any gap there [m] [A].
 FIXTURE = "jig_base"  # The model instance that carries the fixture.
 SAVED = "station/"  # Before the names in a saved state.
-
-
-def collision_model(cell: Cell, config: CellConfig) -> CollisionModel:
-    """Return the planning copy of a cell, with the empty fixture as an obstacle.
-
-    Args:
-        cell: The cell.
-        config: What the planner believes it to be.
-    """
-
-    def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
-        workcell = add_workcell(plant, config, cell.product.tray)
-        plant.RegisterCollisionGeometry(
-            workcell.base,
-            RigidTransform(),
-            cell.fixture.obstacle(),
-            "fixture",
-            CoulombFriction(1.0, 1.0),
-        )
-        arms = add_arms(plant, config, make_drives(config))
-        add_parts(plant, cell.product, config.workcell.X_WT)
-        return arms
-
-    motion = config.motion
-    return CollisionModel(
-        populate,
-        arm_clearance=motion.arm_clearance,
-        obstacle_clearance=motion.obstacle_clearance,
-        hand=(cell.holder.name, "tip"),
-    )
 
 
 @dataclass(frozen=True)

@@ -1,1 +1,1 @@
-"""In which order a product can be put together: precedence, the best orders, proofs of none."""
+"""Orders of assembly: precedence, the best ones, and proofs that there is none."""

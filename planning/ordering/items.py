@@ -1,7 +1,7 @@
 """The items of an order as bit sets: which touch, and which hit which when they leave.
 
 A set of items is an integer whose bit i stands for item i, so that "does i leave this set along j"
-is one AND. Everything here follows from C and the M_j; no geometry is looked at again.
+is one AND. Everything here follows from C and the M_j; no geometry is needed.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.sparse.csgraph import connected_components
 
 from planning.feasibility.directions import DIRECTIONS
 
@@ -22,8 +23,8 @@ class Items:
         names: Items of the order: groups, and parts outside any group.
         touching: Per item, the set of items that it touches.
         hits: Per direction and item, the set of items it hits when it moves along it to infinity.
-        whole: Per item, whether its parts hang together: loose bolts cannot be held as one body.
-        kinds: Per item a number; items of the same number have the same shape and mass.
+        whole: Per item, whether its parts are connected: loose bolts cannot be held as one body.
+        kinds: Per item a number, equal for items of the same shape and mass.
     """
 
     names: tuple[str, ...]
@@ -42,19 +43,19 @@ class Items:
         return [j for j in DIRECTIONS if not self.hits[j][item] & rest]
 
     def leaves(self, item: int, rest: int) -> bool:
-        """Say whether an item leaves the rest of a set along any direction."""
+        """Return whether an item leaves the rest of a set along any direction."""
         return any(not self.hits[j][item] & rest for j in DIRECTIONS)
 
     def connected(self, items: int) -> bool:
-        """Say whether a set hangs together through contacts."""
+        """Return whether a set is connected by contacts."""
         return self._linked(items, items)
 
     def connected_without(self, item: int, rest: int) -> bool:
-        """Say whether the rest of a set that hangs together does so without an item."""
+        """Return whether the rest of a connected set stays connected without an item."""
         return self._linked(self.touching[item] & rest, rest)
 
     def _linked(self, some: int, items: int) -> bool:
-        """Say whether contacts within a set link some of its items with each other."""
+        """Return whether contacts within a set link some of its items with each other."""
         reached = grown = some & -some
         while grown and some & ~reached:
             near = 0
@@ -65,7 +66,7 @@ class Items:
         return not some & ~reached
 
     def listed(self, items: int) -> tuple[str, ...]:
-        """Return the names in a set."""
+        """Return the names of the items in a set."""
         return tuple(self.names[item] for item in members(items))
 
 
@@ -89,14 +90,14 @@ def items_of(
     free: Mapping[str, np.ndarray],
     kinds: Sequence[int] = (),
 ) -> Items:
-    """Combine parts into items: in contact or blocked where any of their parts is.
+    """Combine parts into items, which touch or block if any of their parts do.
 
     Args:
         names: Of the items.
         parts: Per item the matrix indices of its parts.
         contact: (n, n) strictly upper triangular C.
         free: Per direction the (n, n) matrix M_j.
-        kinds: Per item a number, equal for items of the same shape; none: all differ.
+        kinds: Per item a number, equal for items of the same shape; () if all differ.
     """
     touches = (contact + contact.T).astype(bool)
     member = np.zeros((len(names), len(contact)), bool)
@@ -106,23 +107,17 @@ def items_of(
         tuple(names),
         _rows(member, touches),
         {j: _rows(member, free[j] == 0) for j in DIRECTIONS},
-        tuple(_whole(touches[np.ix_(indices, indices)]) for indices in map(list, parts)),
+        tuple(
+            connected_components(touches[np.ix_(indices, indices)], directed=False)[0] == 1
+            for indices in map(list, parts)
+        ),
         tuple(kinds) or tuple(range(len(names))),
     )
 
 
 def _rows(member: np.ndarray, relation: np.ndarray) -> tuple[int, ...]:
     """Return, per item, the set of other items that any of its parts is related to."""
-    chosen = member.astype(float)  # Whole numbers are exact, and far faster to multiply than int.
+    chosen = member.astype(float)  # Exact for whole numbers, and far faster to multiply than int.
     related = chosen @ relation.astype(float) @ chosen.T > 0
     np.fill_diagonal(related, False)
     return tuple(as_set(np.flatnonzero(row).tolist()) for row in related)
-
-
-def _whole(touches: np.ndarray) -> bool:
-    """Say whether the parts of one item hang together."""
-    reached = np.zeros(len(touches), bool)
-    reached[0] = True
-    for _ in range(len(touches)):
-        reached |= touches[reached].any(axis=0)
-    return bool(reached.all())

@@ -1,15 +1,15 @@
 """What makes one order better than another: stable first, then few re-fixings, then low.
 
-An order is compared by three numbers, the first that differs decides:
+Orders are compared by three numbers, in this order of priority:
 
-1. Unstable stages: sub-assemblies, standing with ``up`` up, whose centre of gravity is not above
-   what they stand on, or of which an item would fall (nothing of the sub-assembly below it, and not
-   deep enough to reach into the bed). They stand on what is near the lowest point; where that does
-   not do, on what bears when they are pressed into the bed.
+1. Unstable stages: sub-assemblies, standing with ``up`` up, whose centre of gravity is outside
+   their footprint, or of which an item would fall (no part of the sub-assembly is below it, and it
+   is too high to reach into the bed). The footprint is that of the points near the lowest one; if
+   the centre of gravity is outside of it, that of the imprint in the bed.
 2. Re-fixings: steps in which the incoming item becomes the fixed one (posture against ``up``).
 3. Height of the centre of gravity above the lowest point, mean over all stages.
 
-A stage is the first item alone, and what is there after each step.
+A stage is the first item alone, and what is assembled after each step.
 """
 
 from __future__ import annotations
@@ -19,19 +19,17 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.configuration.config import PlacementConfig
-from cell.fixtures.soft_jig import JigParameters
 from planning.feasibility.algorithm import choose_posture
-from planning.feasibility.directions import opposite
+from planning.feasibility.directions import opposite, rotation_with_up
 from planning.feasibility.solids import Solid
+from planning.fixture_analysis.candidate import FixtureSetup
 from planning.fixture_analysis.footprint import (
     USUAL_DEPTH,
     Footprint,
     footprint,
-    posture,
     standing_points,
 )
-from planning.fixture_analysis.imprint import Surface, press, samples_of
+from planning.fixture_analysis.imprint import PartSurface, press, samples_of
 from planning.ordering.items import Items, as_set, members
 from planning.ordering.search import Cost
 
@@ -42,31 +40,29 @@ ROUNDING = 1e-10  # [m] Keeps rounding errors from deciding heights half-way bet
 
 @dataclass
 class Objective:
-    """Cost of adding an item to a set, with what has been computed before.
+    """Cost of adding an item to a set, with a cache of what has been computed.
 
     Attributes:
         items: Contact and blocking.
         solids: By part name.
         parts: Per item the names of its parts.
         up: Axis of the product frame that points up on the jig.
-        jig: Bag and beads.
-        press_force: That a part is pressed on the jig with [N].
+        setup: For the jig, and the force with which a part is pressed into it.
     """
 
     items: Items
     solids: Mapping[str, Solid]
     parts: Sequence[Sequence[str]]
     up: str
-    jig: JigParameters = JigParameters()
-    press_force: float = PlacementConfig().press_force
+    setup: FixtureSetup
     _stages: dict[int, tuple[int, int]] = field(default_factory=dict)
     _outlines: dict[int, Footprint | None] = field(default_factory=dict)
     _bearing: dict[int, Footprint | None] = field(default_factory=dict)
-    _surfaces: dict[str, Surface] = field(default_factory=dict)
+    _surfaces: dict[str, PartSurface] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        """Sum up each item along ``up``."""
-        self._R_JA = posture(self.up)
+        """Compute extent, mass and moment of each item along ``up``."""
+        self._R_JA = rotation_with_up(self.up).matrix()
         groups = [[self.solids[name] for name in names] for names in self.parts]
         self._vertices = [np.concatenate([s.vertices @ self._R_JA.T for s in g]) for g in groups]
         self._low = [float(vertices[:, 2].min()) for vertices in self._vertices]
@@ -81,22 +77,19 @@ class Objective:
         return unstable, int(bool(rest) and self.refixes(rest, item)), height
 
     def refixes(self, rest: int, item: int) -> bool:
-        """Say whether Algorithm 1 fixes the item instead of what is there."""
+        """Return whether Algorithm 1 fixes the item instead of the set it is added to."""
         against = opposite(self.up)
         directions = self.items.directions(item, rest)
         if against not in directions:
             return False
-        return self.up not in directions or self._lower_turned_over(rest | 1 << item, directions)
-
-    def _lower_turned_over(self, stage: int, directions: list[str]) -> bool:
-        """Say whether Algorithm 1 prefers the direction against ``up`` by the height of the CoG."""
-        numbers = list(members(stage))
+        if self.up not in directions:
+            return True
+        # Both directions along ``up`` are open: the height of the CoG decides.
+        numbers = list(members(rest | 1 << item))
         height = self._cog(numbers)[2]
-        low = min(self._low[i] for i in numbers)
-        top = max(self._top[i] for i in numbers)
-        heights = {self.up: height - low, opposite(self.up): top - height}
-        listed = {j: heights.get(j, 0.0) for j in directions}
-        return choose_posture(listed, self.up)[0] == opposite(self.up)
+        low, top = min(self._low[i] for i in numbers), max(self._top[i] for i in numbers)
+        heights = {self.up: height - low, against: top - height}
+        return choose_posture({j: heights.get(j, 0.0) for j in directions}, self.up)[0] == against
 
     def stage(self, stage: int) -> tuple[int, int]:
         """Return whether a sub-assembly is unstable (0 or 1), and its CoG's height [um]."""
@@ -104,22 +97,17 @@ class Objective:
             numbers = list(members(stage))
             low = min(self._low[i] for i in numbers)
             cog = self._cog(numbers)
-            unstable = self._loose(stage, low) or not self._stands(numbers, low, cog[:2])
+            below = self.items.hits[opposite(self.up)]
+            falls = any(self._low[i] > low + USUAL_DEPTH and not below[i] & stage for i in numbers)
+            unstable = falls or not self._stands(numbers, low, cog[:2])
             self._stages[stage] = int(unstable), round((cog[2] - low + ROUNDING) / HEIGHT_UNIT)
         return self._stages[stage]
 
     def _cog(self, numbers: list[int]) -> np.ndarray:
         return self._moment[numbers].sum(axis=0) / self._mass[numbers].sum()
 
-    def _loose(self, stage: int, low: float) -> bool:
-        """Say whether an item of a sub-assembly would fall."""
-        below = self.items.hits[opposite(self.up)]
-        return any(
-            self._low[i] > low + USUAL_DEPTH and not below[i] & stage for i in members(stage)
-        )
-
     def _stands(self, numbers: list[int], low: float, cog: np.ndarray) -> bool:
-        """Say whether the centre of gravity (2,) is above what a sub-assembly stands on."""
+        """Return whether the centre of gravity (2,) is inside a sub-assembly's footprint."""
         lowest = as_set(i for i in numbers if self._low[i] <= low + USUAL_DEPTH)
         if lowest not in self._outlines:
             points = standing_points([self._vertices[i] for i in members(lowest)])
@@ -127,21 +115,21 @@ class Objective:
         outline = self._outlines[lowest]
         if outline is not None and outline.margin(cog) > 0.0:
             return True
-        reaching = as_set(i for i in numbers if self._low[i] <= low + self.jig.bag.cap_height)
+        cap_height = self.setup.jig.bag.cap_height
+        reaching = as_set(i for i in numbers if self._low[i] <= low + cap_height)
         if reaching not in self._bearing:
-            self._bearing[reaching] = self._pressed(reaching)
+            self._bearing[reaching] = self._bearing_outline(reaching)
         outline = self._bearing[reaching]
         return outline is not None and outline.margin(cog) > 0.0
 
-    def _pressed(self, reaching: int) -> Footprint | None:
-        """Return what bears, in the plane of the turned product, when a set is pressed in."""
+    def _bearing_outline(self, reaching: int) -> Footprint | None:
+        """Press a set into the bed; return what bears, in the plane of the turned product."""
         numbers = list(members(reaching))
         middle = self._cog(numbers)[:2]
-        parts = [self._surface(name) for i in numbers for name in self.parts[i]]
-        outline = press(parts, self._R_JA, middle, self.jig, self.press_force).contact
-        return None if outline is None else outline.shifted(middle)
-
-    def _surface(self, name: str) -> Surface:
-        if name not in self._surfaces:
-            self._surfaces[name] = samples_of(self.solids[name])
-        return self._surfaces[name]
+        names = [name for i in numbers for name in self.parts[i]]
+        for name in names:
+            if name not in self._surfaces:
+                self._surfaces[name] = samples_of(self.solids[name])
+        surfaces = [self._surfaces[name] for name in names]
+        imprint = press(surfaces, self._R_JA, middle, self.setup.jig, self.setup.press_force)
+        return None if imprint.contact is None else imprint.contact.shifted(middle)

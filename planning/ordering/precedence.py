@@ -1,14 +1,15 @@
-"""What has to come before what, whatever the rest of the order: the precedence graph.
+"""Precedence constraints: which item has to be added before which, in every feasible order.
 
-With the first item given, k has to wait for i if one of two tests says so:
+Given the first item, i has to precede k if one of two tests says so:
 
-- Blocking: take off everything that can be taken off while k stays. What remains cannot leave while
-  k is there, so it has to be there before k is.
-- Contact: k must touch something when it comes. If every chain of contacts from the first item to k
-  leads through i, then i comes before k.
+- Blocking: remove everything that can be removed while k stays. What remains cannot leave while k
+  is present, so it has to be present before k is added.
+- Contact: k must touch something when it is added. If every chain of contacts from the first item
+  to k leads through i, then i precedes k.
 
-Both are necessary, so every arrow holds in every feasible order that begins with that item. They
-are not sufficient where one of several items would do as a neighbour: the search decides that.
+Both are necessary conditions, so every constraint holds in every feasible order that begins with
+that item. They are not sufficient if any one of several items would do as a neighbour: the search
+decides that.
 """
 
 from __future__ import annotations
@@ -22,12 +23,12 @@ from planning.ordering.separation import locked_core
 
 @dataclass(frozen=True)
 class Precedence:
-    """One arrow of the graph.
+    """One edge of the precedence graph.
 
     Attributes:
-        before: Name of the item that comes first.
-        after: Name of the item that waits for it.
-        reason: "blocking": it could not come in later. "contact": nothing else carries the chain.
+        before: Name of the item that is added first.
+        after: Name of the item that has to wait for it.
+        reason: "blocking": it would be blocked later. "contact": nothing else connects the other.
     """
 
     before: str
@@ -36,29 +37,26 @@ class Precedence:
 
 
 def precedences(items: Items, first: int) -> tuple[Precedence, ...]:
-    """Return the arrows that do not follow from others, for orders that begin with an item."""
+    """Return the constraints that do not follow from others, for a given first item."""
     others = [k for k in range(len(items.names)) if k != first]
-    blocked = {k: _has_to_be_there(items, first, k) for k in others}
+    both = {k: 1 << k | 1 << first for k in others}
+    # Those that cannot leave while the first item and k are present.
+    blocked = {k: locked_core(items, kept=both[k]) & ~both[k] for k in others}
     cut_off = {i: items.everything & ~_reached(items, first, without=i) for i in others}
     before = {
         k: blocked[k] | as_set(i for i in others if i != k and cut_off[i] >> k & 1) for k in others
     }
     full = _closure(before)
+    direct = {k: full[k] & ~_union(full.get(i, 0) for i in members(full[k])) for k in before}
     return tuple(
         Precedence(items.names[i], items.names[k], "blocking" if blocked[k] >> i & 1 else "contact")
         for k in before
-        for i in members(_direct(k, full))
+        for i in members(direct[k])
     )
 
 
-def _has_to_be_there(items: Items, first: int, k: int) -> int:
-    """Return the items that cannot leave while the first one and k are there."""
-    both = 1 << k | 1 << first
-    return locked_core(items, kept=both) & ~both
-
-
 def _reached(items: Items, first: int, without: int) -> int:
-    """Return the items that chains of contacts from the first one lead to, past one of them."""
+    """Return the items that chains of contacts connect to the first one without a given item."""
     reached = grown = 1 << first
     while grown:
         near = _union(items.touching[i] for i in members(grown))
@@ -68,7 +66,7 @@ def _reached(items: Items, first: int, without: int) -> int:
 
 
 def _closure(before: dict[int, int]) -> dict[int, int]:
-    """Return, per item, all that come before it through any chain."""
+    """Return, per item, all that precede it directly or indirectly."""
     full = dict(before)
     changed = True
     while changed:
@@ -78,11 +76,6 @@ def _closure(before: dict[int, int]) -> dict[int, int]:
             changed |= more != earlier
             full[k] = more
     return full
-
-
-def _direct(k: int, full: dict[int, int]) -> int:
-    """Return what comes before an item and not before something else that does."""
-    return full[k] & ~_union(full.get(i, 0) for i in members(full[k]))
 
 
 def _union(sets: Iterable[int]) -> int:

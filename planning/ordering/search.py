@@ -1,72 +1,84 @@
-"""The best orders of assembly, found by taking the product apart.
+"""The best orders of assembly, found by disassembly.
 
-From the end to the beginning: an item may be taken off a set if it leaves the rest along one of the
-six directions and the rest still hangs together, which is what Algorithm 1 asks of the step that
-adds it. What can be taken off a set can be taken off every smaller one that contains it, so taking
-apart hardly ever runs into a dead end, where putting together does all the time.
+From the end to the beginning: an item may be removed from a set if it leaves the rest along one of
+the six directions and the rest stays connected, which is what Algorithm 1 requires of the step that
+adds it. What can be removed from a set can be removed from every smaller set that contains it, so
+disassembly hardly ever reaches a dead end, which assembly does all the time.
 
-The cost of a step depends on the set and the item alone. So two ways to the same set are the same
-from then on, and only the ``keep`` cheapest are remembered: dynamic programming over sets, layer by
-layer. That is exact as long as the layers are small (``layer_width``); beyond that the cheapest
-sets of a layer go on, and the answer says that it is the best found, not the best there is.
+The cost of a step depends only on the set and the item. So two ways to the same set are equivalent
+from then on, and only the ``keep`` cheapest are stored: dynamic programming over sets, layer by
+layer. That is exact as long as the layers are small (``layer_width``); beyond that only the
+cheapest sets of a layer are expanded (beam search), and the result is marked as not proved best.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 
 from planning.ordering.items import Items, members
 
-EFFORT = 80_000  # [D] Steps that are looked at, about: a second.
-MOST_SETS = 100_000  # [D] Sets that `any_order` looks at: some seconds.
+EFFORT = 80_000  # [D] Steps that are examined, about: a second.
+MOST_SETS = 100_000  # [D] Sets that `any_order` examines: some seconds.
 
 Cost = tuple[int, ...]  # Compared from left to right; whole numbers, so that sums are exact.
 StepCost = Callable[[int, int], Cost]  # Of adding an item to a set; to none for the first.
-Partial = tuple[Cost, tuple[int, ...]]  # Cost and the items taken off, in the order of assembly.
+PartialOrder = tuple[Cost, tuple[int, ...]]  # Cost and items removed, in the order of assembly.
 
 
 class Undecided(Exception):
-    """The search gave up before it could tell whether there is an order."""
+    """The search reached its limit before it could decide whether an order exists."""
 
 
 @dataclass(frozen=True)
-class Found:
+class SearchResult:
     """Result of a search.
 
     Attributes:
         orders: Cost and items, cheapest first; empty if there is no order.
         exact: Whether no order of lower cost exists.
-        sets: How many sets of items were looked at.
+        sets: How many sets of items were examined.
     """
 
-    orders: tuple[Partial, ...]
+    orders: tuple[PartialOrder, ...]
     exact: bool
     sets: int
 
 
 def layer_width(items: Items) -> int:
-    """Return how many sets of a layer go on: 200 of 20 items, 32 of 50. 10 items never reach it."""
+    """Return how many sets of a layer are expanded: 200 for 20 items, 32 for 50."""
     return max(10, EFFORT // len(items.names) ** 2)
 
 
-def best_orders(items: Items, cost: StepCost, keep: int = 1) -> Found:
+def best_orders(items: Items, cost: StepCost, keep: int = 1) -> SearchResult:
     """Return the cheapest orders that differ by more than an exchange of equal parts.
 
     Raises:
         Undecided: No order was found among the sets kept, and there are too many to try all.
     """
     if not items.connected(items.everything):
-        return Found((), True, 1)
-    layer: dict[int, list[Partial]] = {items.everything: [((), ())]}
+        return SearchResult((), True, 1)
+    layer: dict[int, list[PartialOrder]] = {items.everything: [((), ())]}
     exact, sets, width = True, 1, layer_width(items)
     for _ in items.names[1:]:
-        steps = _taken_apart(items, layer, cost)
+        steps = _removals(items, layer, cost)
         sets += len(steps)
         exact = exact and len(steps) <= width
-        cheapest = sorted(steps, key=lambda rest: (min(_totals(layer, rest, steps[rest])), rest))
+        lowest = {
+            rest: min(_sum(spent, layer[rest | 1 << item][0][0]) for spent, item in ways)
+            for rest, ways in steps.items()
+        }
+        cheapest = sorted(steps, key=lambda rest: (lowest[rest], rest))
         layer = {
-            rest: _distinct(items, _ways(layer, rest, steps[rest]), keep)
+            rest: _distinct(
+                items,
+                [
+                    (_sum(spent, before), (item, *order))
+                    for spent, item in steps[rest]
+                    for before, order in layer[rest | 1 << item]
+                ],
+                keep,
+            )
             for rest in cheapest[:width]
         }
     finished = [
@@ -77,15 +89,21 @@ def best_orders(items: Items, cost: StepCost, keep: int = 1) -> Found:
         if items.whole[item]
     ]
     if finished or exact:
-        return Found(tuple(_distinct(items, finished, keep)), exact, sets)
+        return SearchResult(tuple(_distinct(items, finished, keep)), exact, sets)
     order = any_order(items)
-    return Found(((_total(order, cost), order),) if order else (), not order, sets)
+    if order is None:
+        return SearchResult((), True, sets)
+    total, placed = cost(0, order[0]), 1 << order[0]
+    for item in order[1:]:
+        total = _sum(total, cost(placed, item))
+        placed |= 1 << item
+    return SearchResult(((total, order),), False, sets)
 
 
-def _taken_apart(
-    items: Items, layer: Mapping[int, list[Partial]], cost: StepCost
+def _removals(
+    items: Items, layer: Mapping[int, list[PartialOrder]], cost: StepCost
 ) -> dict[int, list[tuple[Cost, int]]]:
-    """Return the sets that are left when an item is taken off, with the step's cost and item."""
+    """Return the sets that remain when an item is removed, with the step's cost and item."""
     found: dict[int, list[tuple[Cost, int]]] = {}
     for whole in layer:
         for item in members(whole):
@@ -98,27 +116,9 @@ def _taken_apart(
     return found
 
 
-def _totals(
-    layer: Mapping[int, list[Partial]], rest: int, steps: list[tuple[Cost, int]]
-) -> Iterator[Cost]:
-    """Yield, per step to a set, the cost of the cheapest way that ends with it."""
-    return (_sum(spent, layer[rest | 1 << item][0][0]) for spent, item in steps)
-
-
-def _ways(
-    layer: Mapping[int, list[Partial]], rest: int, steps: list[tuple[Cost, int]]
-) -> list[Partial]:
-    """Return all the ways to a set."""
-    return [
-        (_sum(spent, before), (item, *order))
-        for spent, item in steps
-        for before, order in layer[rest | 1 << item]
-    ]
-
-
-def _distinct(items: Items, ways: list[Partial], keep: int) -> list[Partial]:
-    """Return the cheapest, one for each sequence of kinds."""
-    chosen: dict[tuple[int, ...], Partial] = {}
+def _distinct(items: Items, ways: list[PartialOrder], keep: int) -> list[PartialOrder]:
+    """Return the cheapest ways, one for each sequence of kinds."""
+    chosen: dict[tuple[int, ...], PartialOrder] = {}
     for way in sorted(ways):
         chosen.setdefault(tuple(items.kinds[item] for item in way[1]), way)
         if len(chosen) == keep:
@@ -127,7 +127,7 @@ def _distinct(items: Items, ways: list[Partial], keep: int) -> list[Partial]:
 
 
 def any_order(items: Items) -> tuple[int, ...] | None:
-    """Return some feasible order, or None if there is none: every set is tried at most once.
+    """Return some feasible order, or None if there is none; every set is tried at most once.
 
     Raises:
         Undecided: After ``MOST_SETS`` sets.
@@ -161,11 +161,3 @@ def any_order(items: Items) -> tuple[int, ...] | None:
 
 def _sum(a: Cost, b: Cost) -> Cost:
     return tuple(x + y for x, y in zip(a, b, strict=True)) if b else a
-
-
-def _total(order: tuple[int, ...], cost: StepCost) -> Cost:
-    total, rest = cost(0, order[0]), 1 << order[0]
-    for item in order[1:]:
-        total = _sum(total, cost(rest, item))
-        rest |= 1 << item
-    return total

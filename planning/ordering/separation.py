@@ -2,17 +2,17 @@
 
 Two facts make it exact without trying orders:
 
-What leaves a set leaves every subset that contains it. So taking off single items until none can be
-taken off ends in the same core whatever was taken first, and if the core has more than one item, no
-order of single items exists: whichever of the core comes last would have to leave the others.
+What leaves a set leaves every subset that contains it. So removing single items until none can be
+removed ends in the same core whatever was removed first. If the core has more than one item, no
+order of single items exists: whichever of the core is added last would have to leave the others.
 
-A sub-assembly leaves the rest along j exactly if none of its items hits one of the rest. Draw an
-arrow from each item to those it hits along j: such a sub-assembly exists if and only if the arrows
-do not connect all items in a cycle (the graph is not strongly connected; Wilson and Latombe's
-blocking graph). The graph along -j is that along +j with the arrows reversed: three axes suffice.
+A sub-assembly leaves the rest along j exactly if none of its items hits one of the rest. In the
+blocking graph (Wilson and Latombe), with an edge from each item to those it hits along j, such a
+sub-assembly exists if and only if the graph is not strongly connected. The graph along -j is that
+along +j with its edges reversed: three axes suffice.
 
 Considered are single straight translations along the six directions to infinity: no rotations, no
-paths with turns. Contact is not asked for: it could only forbid more.
+paths with turns. Contact is not required: it could only forbid more.
 """
 
 from __future__ import annotations
@@ -27,14 +27,14 @@ from planning.ordering.items import Items, as_set, members
 
 @dataclass(frozen=True)
 class Interlock:
-    """Items of which none can be the last to come in.
+    """Items of which none can be added last.
 
     Attributes:
         items: Names of the core: none of them leaves the others along any direction.
         subassembly: Names of a sub-assembly of the core that leaves the rest of it, or none.
         direction: Along which it does, or "".
-        stuck: Names of items that no sub-assemblies can build up either; none if all of the product
-            can be built from sub-assemblies.
+        stuck: Names of items that cannot be assembled from sub-assemblies either; none if the whole
+            product can.
     """
 
     items: tuple[str, ...]
@@ -44,11 +44,11 @@ class Interlock:
 
 
 def locked_core(items: Items, kept: int = 0) -> int:
-    """Take off single items until none leaves; return the set that remains.
+    """Remove single items until none leaves; return the set that remains.
 
     Args:
         items: The items.
-        kept: Set of items that are not taken off.
+        kept: Set of items that are not removed.
     """
     core, before = items.everything, 0
     while core != before:
@@ -60,7 +60,7 @@ def locked_core(items: Items, kept: int = 0) -> int:
 
 
 def find_interlock(items: Items) -> Interlock | None:
-    """Return why no order of single items exists, or None if blocking does not forbid it."""
+    """Return why no order of single items exists, or None if blocking does not rule it out."""
     core = locked_core(items)
     if not core & (core - 1):
         return None
@@ -72,7 +72,7 @@ def find_interlock(items: Items) -> Interlock | None:
 def split(items: Items, core: int) -> tuple[int, str]:
     """Return a sub-assembly that leaves the rest of a set, and the direction; 0 if there is none.
 
-    Of several, one that hangs together and whose rest does, and of those the smallest.
+    Of several, one that is connected and whose rest is, and of those the smallest.
     """
     choices = []
     for j, hits in items.hits.items():
@@ -95,9 +95,9 @@ def _closed_parts(core: int, hits: tuple[int, ...]) -> list[int]:
 
 
 def inseparable(items: Items, core: int) -> int:
-    """Split a set, and what comes of it, as far as possible; return the first locked set or 0.
+    """Split a set recursively as far as possible; return the first inseparable set, or 0.
 
-    A part of what can be taken apart can be taken apart: any split will do.
+    Subsets of a separable set are separable, so any split will do.
     """
     waiting = [core]
     while waiting:

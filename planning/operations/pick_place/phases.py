@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform
 
 from cell.products.product import Grasp
 from cell.simulation.events import fix_part, prepare_fixture, receive_part
-from cell.simulation.phase import Condition, Phase, after, motion_finished
+from cell.simulation.phase import Phase, after, motion_finished
 from planning.motion.kinematics import Unreachable
 from planning.operations.grasping import (
     Reach,
@@ -84,6 +84,7 @@ def pick_place(
         suits: Whether its pose on the fixture suits whatever else comes later.
     """
     arm, awake = station.holder, frozenset([part])
+    fixture, root = station.cell.fixture, station.root
     yield from look(
         station, PlacePhase.LOOK, part, settle=LOOK_TIME, start=(prepare_fixture,), awake=awake
     )
@@ -130,7 +131,7 @@ def pick_place(
     )
     yield Phase(
         PlacePhase.FIX,
-        _fixed(station),
+        lambda sensed: sensed.time >= JAM_TIME and fixture.fixed(root),
         timeout=5.0,
         subject=part,
         guard=holding,
@@ -167,9 +168,3 @@ def _top_first(station: Station, part: str, X_WP: RigidTransform) -> Iterator[Re
         return round(X_WJaw.rotation().matrix()[2, 2], 2), float(np.hypot(away[0], away[1]))
 
     return reachable_grasps(station, part, X_WP, sorted(station.part(part).grasps, key=rank))
-
-
-def _fixed(station: Station) -> Condition:
-    """Return the end condition that the fixture holds, and has had the time to."""
-    fixture, root = station.cell.fixture, station.root
-    return lambda sensed: sensed.time >= JAM_TIME and fixture.fixed(root)

@@ -68,7 +68,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         timeout=5.0,
         subject=part,
         guard=holding,
-        start=(free_part(part),),
+        start=(free_part,),
         awake=awake,
     )
     yield from lift(station, part, reach, LIFT)

@@ -1,32 +1,32 @@
-"""The paper's remark on bolts under the plate, checked.
+"""Check of the paper's remark on bolts under the plate.
 
 The paper says that the plate with the bolts under it was not chosen because its centre of gravity
-is higher than upside down. Its own Algorithm 1 never compares the two where only one direction is
-open (which is so for bolts with heads), so the remark is checked beside it. The answer depends on
-the side that the plate's foot is on: with the foot on the motor's side, as on the real unit and in
-``motor_unit``, the plate lies lower on its bolts' heads (7.3 mm) than on its foot (15.7 mm), and
-the remark does not hold; with the foot on the shaft's side it does.
+is higher than upside down. Algorithm 1 never compares the two if only one direction is open, which
+is the case for bolts with heads, so the remark is checked separately. The answer depends on the
+side of the plate's foot: with the foot on the motor's side, as on the real unit and in
+``motor_unit``, the centre of gravity is lower with the plate on the bolt heads (7.3 mm) than on its
+foot (15.7 mm), and the remark does not hold; with the foot on the shaft's side it does.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 from cell.products.product import Product
-from planning.feasibility.algorithm import Geometry
 from planning.feasibility.directions import opposite
-from planning.feasibility.solids import cog_height
+from planning.feasibility.solids import Solid, cog_height
 
 
 @dataclass(frozen=True)
 class BoltRemark:
-    """Heights of a part with its bolts, above the lowest point.
+    """Height of the centre of gravity of a part with its bolts, upright and upside down.
 
     Attributes:
         part: Name of the part under the heads.
         bolts: How many bolts it carries.
-        heads_up: Height of the common centre of gravity with ``up`` up [m].
-        turned_over: The same upside down, the bolts under the part [m].
+        heads_up: Height above the lowest point with ``up`` up [m].
+        turned_over: The same upside down, with the bolts under the part [m].
     """
 
     part: str
@@ -49,17 +49,17 @@ class BoltRemark:
         )
 
 
-def bolt_remarks(product: Product, geometry: Geometry) -> list[BoltRemark]:
-    """Return the check for every part that lies under bolt heads."""
+def bolt_remarks(product: Product, solids: Mapping[str, Solid]) -> list[BoltRemark]:
+    """Return the check for every part that is clamped by bolts."""
     carried: dict[str, list[str]] = {}
-    for name, fastener in product.screws.items():
-        carried.setdefault(fastener.clamps, []).append(name)
+    for name, screw in product.screws.items():
+        carried.setdefault(screw.clamps, []).append(name)
     return [
         BoltRemark(
             part,
             len(bolts),
-            cog_height(geometry.solids, (part, *bolts), product.up),
-            cog_height(geometry.solids, (part, *bolts), opposite(product.up)),
+            cog_height(solids, (part, *bolts), product.up),
+            cog_height(solids, (part, *bolts), opposite(product.up)),
         )
         for part, bolts in carried.items()
     ]

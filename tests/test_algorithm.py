@@ -16,7 +16,7 @@ from tiny_products import (
     tube_and_pins,
 )
 
-from cell.errors import BadOrder, CellError, UnknownName
+from cell.errors import BadOrder, InputError, UnknownName
 from cell.products.loading import load_product
 from cell.products.product import Product
 from planning import FixingPlan, plan
@@ -48,7 +48,7 @@ def test_motor_unit_reproduces_the_papers_table(motor_unit, order):
 
 
 @pytest.mark.parametrize("tolerance", [1e-6, 2e-4])
-def test_the_table_does_not_hang_on_the_tolerance(motor_unit, tolerance):
+def test_the_table_does_not_depend_on_the_tolerance(motor_unit, tolerance):
     order = ("motor", "plate", "bolts")
     assert choices(plan(motor_unit, order, tolerance=tolerance)) == PAPER_TABLE[order]
 
@@ -171,7 +171,7 @@ def test_bolts_may_be_listed_one_by_one(motor_unit):
 
 
 def test_products_that_cannot_be_planned_are_refused():
-    with pytest.raises(CellError, match="no parts"):
+    with pytest.raises(InputError, match="no parts"):
         plan(Product("nothing", {}))
     with pytest.raises(UnknownName, match="up axis 'up'"):
         plan(replace(peg_in_hole(), up="up"))

@@ -1,9 +1,9 @@
-"""Screw threads, recognised from the meshes alone.
+"""Screw threads as CAD draws them, recognised from the meshes alone.
 
 CAD usually draws a thread as two cylinders that overlap: the hole at the minor (or tap drill)
-diameter, the bolt at the nominal one. Their common volume is a thin tube. What looks like that is
-taken for a thread, whatever the parts are called: the part inside the tube is the bolt, the one
-around it carries the thread, and the bolt is free to leave along the tube's axis.
+diameter, the bolt at the nominal one. Their common volume is a thin tube. Such a tube is taken for
+a thread, whatever the names of the parts: the part inside the tube is the bolt, the one around it
+has the inner thread, and the bolt is free to leave along the tube's axis.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ THREAD_HEIGHT_PER_PITCH = 0.5413  # [S] ISO 68-1: 5/8 H = 0.5413 P from major to
 LARGEST_PITCH = 0.25  # [S] ISO 261: of the diameter, M1 coarse; larger threads are finer.
 SMALLEST_HEIGHT = 0.02  # [D] Of the diameter: 3/4 of the depth of a thread of pitch d / 20, fine.
 ROUND = 0.04  # [A] Of the radius: sagitta of 12 facets, the coarsest circle that CAD exports.
-FULL_TURN = 8  # [A] A tube shows itself in each of so many sectors about its axis.
+PROBES = 8  # [A] Points about the axis at which a part is tested for material.
 COARSEST_FACET = 0.7  # [rad] [A] Nine facets a turn: the largest step between corners of a tube.
 
 
 @dataclass(frozen=True)
-class Thread:
-    """A bolt in the part that carries its thread.
+class CadThread:
+    """A bolt in the part with its inner thread, as an overlap of their meshes.
 
     Attributes:
         bolt: Name of the part with the outer thread.
@@ -46,8 +46,8 @@ class Thread:
     length: float
 
 
-def find_thread(a: Solid, b: Solid, tolerance: float) -> Thread | None:
-    """Return the thread by which two overlapping parts hold each other, or None.
+def find_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | None:
+    """Return the thread that joins two overlapping parts, or None.
 
     Args:
         a: One part.
@@ -57,21 +57,26 @@ def find_thread(a: Solid, b: Solid, tolerance: float) -> Thread | None:
     common = a.manifold ^ b.manifold
     pieces = [piece for piece in common.decompose() if piece.volume() > 0.0]
     thick = [piece for piece in pieces if thickness(piece) > tolerance]
-    if len(thick) != 1:  # A bolt is in one thread; several tubes are not one fastener.
+    if len(thick) != 1:  # A bolt has one thread; several tubes are not one fastener.
         return None
     tube = _tube(thick[0], tolerance)
     if tube is None:
         return None
     axis, middle, inner, outer, length = tube
     radius = inner - min(ROUND * outer + tolerance, inner / 2)
-    if _holds(a, middle, axis, radius) == _holds(b, middle, axis, radius):
+    if _fills(a, middle, axis, radius) == _fills(b, middle, axis, radius):
         return None
-    bolt, nut = (a, b) if _holds(a, middle, axis, radius) else (b, a)
-    axis = _outwards(bolt, nut, axis)
+    bolt, nut = (a, b) if _fills(a, middle, axis, radius) else (b, a)
+    # The bolt leaves on the side on which it protrudes further from the nut.
+    bolt_along, nut_along = bolt.vertices @ axis, nut.vertices @ axis
+    ahead, behind = bolt_along.max() - nut_along.max(), nut_along.min() - bolt_along.min()
+    axis = axis if ahead >= behind else -axis
+    axis = np.where(np.abs(axis) < 1e-6, 0.0, axis)  # Rounding of zeros.
+    axis = axis / np.linalg.norm(axis)
     x, y, z = (float(value) for value in axis)
     px, py, pz = (float(value) for value in middle)
     height = outer - inner
-    return Thread(bolt.name, nut.name, (x, y, z), (px, py, pz), 2.0 * outer, height, length)
+    return CadThread(bolt.name, nut.name, (x, y, z), (px, py, pz), 2.0 * outer, height, length)
 
 
 def thickness(piece: manifold3d.Manifold) -> float:
@@ -94,7 +99,10 @@ def _tube(
     axis = vectors[:, 0]
     across = vectors[:, 1:]
     flat = vertices @ across
-    centre = _circle_centre(flat)
+    # Two concentric circles: the first fit is between them, the second on the outer one.
+    rough = _fitted_centre(flat)
+    radii = np.hypot(*(flat - rough).T)
+    centre = _fitted_centre(flat[radii >= (radii.min() + radii.max()) / 2.0])
     radii = np.hypot(*(flat - centre).T)
     inner, outer = float(radii.min()), float(radii.max())
     along = vertices @ axis
@@ -105,52 +113,28 @@ def _tube(
         return None
     if length < 2.0 * height:
         return None
-    if not _full_turn(triangles @ across - centre):
+    # A tube surrounds its axis without a gap: no large step between the angles of its corners.
+    seen = triangles @ across - centre
+    angle = np.sort(np.arctan2(seen[..., 1], seen[..., 0]).ravel())
+    if np.diff(angle, append=angle[0] + 2.0 * np.pi).max() >= COARSEST_FACET:
         return None
     middle = across @ centre + axis * float(along.min() + along.max()) / 2.0
     return axis, middle, inner, outer, length
 
 
-def _circle_centre(points: np.ndarray) -> np.ndarray:
-    """Return the centre (2,) of two concentric circles that points lie on, or between."""
-    rough = _fitted_circle(points)
-    radii = np.hypot(*(points - rough).T)
-    return _fitted_circle(points[radii >= (radii.min() + radii.max()) / 2.0])
-
-
-def _fitted_circle(points: np.ndarray) -> np.ndarray:
+def _fitted_centre(points: np.ndarray) -> np.ndarray:
     """Return the centre of the least-squares circle: |p|^2 = 2 c.p + constant."""
     system = np.c_[2.0 * points, np.ones(len(points))]
     return np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0][:2]
 
 
-def _full_turn(triangles: np.ndarray) -> bool:
-    """Say whether projected triangles (m, 3, 2) go all around the origin with small steps."""
-    angle = np.sort(np.arctan2(triangles[..., 1], triangles[..., 0]).ravel())
-    steps = np.diff(angle, append=angle[0] + 2.0 * np.pi)
-    return bool(steps.max() < COARSEST_FACET)
-
-
-def _holds(solid: Solid, middle: np.ndarray, axis: np.ndarray, radius: float) -> bool:
-    """Say whether a part fills the wall of a thin cylinder just inside the tube."""
+def _fills(solid: Solid, middle: np.ndarray, axis: np.ndarray, radius: float) -> bool:
+    """Return whether a part has material all around the axis at a radius just inside the tube."""
     side = np.linalg.svd(axis[None])[2][1]
     ray = np.cross(axis, side)
-    angles = 2.0 * np.pi * (np.arange(FULL_TURN) + 0.37) / FULL_TURN
+    angles = 2.0 * np.pi * (np.arange(PROBES) + 0.37) / PROBES
     points = [middle + radius * (np.cos(t) * side + np.sin(t) * ray) for t in angles]
     size = 0.02 * radius
     probes = [manifold3d.Manifold.sphere(size, 6).translate(list(p)) for p in points]
     inside = [(solid.manifold ^ probe).volume() > 0.5 * probe.volume() for probe in probes]
     return all(inside)
-
-
-def _outwards(bolt: Solid, nut: Solid, axis: np.ndarray) -> np.ndarray:
-    """Return the axis, turned to the side on which the bolt reaches further out of the nut."""
-    bolt_along, nut_along = bolt.vertices @ axis, nut.vertices @ axis
-    ahead, behind = bolt_along.max() - nut_along.max(), nut_along.min() - bolt_along.min()
-    return _clean(axis if ahead >= behind else -axis)
-
-
-def _clean(axis: np.ndarray) -> np.ndarray:
-    """Return the axis with the rounding of its zeros removed, of length 1."""
-    axis = np.where(np.abs(axis) < 1e-6, 0.0, axis)
-    return axis / np.linalg.norm(axis)

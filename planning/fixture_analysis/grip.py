@@ -1,43 +1,42 @@
-"""Whether the parallel gripper can carry a body in a posture."""
+"""Whether the parallel gripper can grip a part in a posture, and at which width."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
 
-from cell.machines.grippers import HAND_E
 from cell.products.product import Product
-from planning.feasibility.algorithm import Geometry
+from planning.feasibility.solids import Solid
 from planning.fixture_analysis.footprint import footprint
 
-STROKE = HAND_E.stroke  # [m]
 BELOW = "the hand would have to come from below, through the jig"
-WIDE = f"{{:.0f}} mm across, the gripper opens {1e3 * STROKE:.0f} mm"
 FROM_BELOW = 0.1  # Rise of an approach per length above which it comes from below, from the jig.
 
 
 @dataclass(frozen=True, eq=False)
-class Gripper:
-    """The gripper before a product's parts.
+class GripAnalysis:
+    """Grip widths of a product's parts.
 
     Attributes:
         product: For declared grasps.
-        geometry: Shapes.
-        widths: What has been found of each part in each posture.
+        solids: Parts by name.
+        stroke: Largest opening of the gripper [m].
+        widths: Cache: width and obstacle of each part in each posture.
     """
 
     product: Product
-    geometry: Geometry
+    solids: Mapping[str, Solid]
+    stroke: float
     widths: dict[tuple[str, bytes], tuple[float, str]] = field(default_factory=dict)
 
     def width(self, parts: Sequence[str], R_JA: np.ndarray) -> tuple[float, str]:
-        """Return the smallest width to grip of any of the parts [m], and what is against it or "".
+        """Return the smallest grip width of any of the parts [m], and the obstacle or "".
 
-        A part's declared grasps say how, also those with jaws made for more than the stroke; only
-        those that come from below in this posture do not count. A part without any is gripped
-        across the narrowest place of its outline from above.
+        A part with declared grasps is gripped by one of them, also by one with jaws made for more
+        than the stroke, unless it comes from below in this posture. A part without grasps is
+        gripped from above, across the narrowest place of its outline.
         """
         key = R_JA.tobytes()
         for name in (name for name in parts if (name, key) not in self.widths):
@@ -49,15 +48,16 @@ class Gripper:
         part = self.product.parts[name]
         if part.grasps:
             R_JP = R_JA @ part.X_AP.rotation().matrix()
-            rises = [R_JP[2] @ grasp.X_PJaw.rotation().matrix()[:, 2] for grasp in part.grasps]
             usable = [
                 grasp.width
-                for grasp, rise in zip(part.grasps, rises, strict=True)
-                if rise < FROM_BELOW
+                for grasp in part.grasps
+                if R_JP[2] @ grasp.X_PJaw.rotation().matrix()[:, 2] < FROM_BELOW
             ]
             if usable:
                 return min(usable), ""
             return min(grasp.width for grasp in part.grasps), BELOW
-        outline = footprint((self.geometry.solids[name].vertices @ R_JA.T)[:, :2])
+        outline = footprint((self.solids[name].vertices @ R_JA.T)[:, :2])
         width = 0.0 if outline is None else outline.narrowest
-        return width, WIDE.format(1e3 * width) if width > STROKE else ""
+        if width <= self.stroke:
+            return width, ""
+        return width, f"{1e3 * width:.0f} mm across, the gripper opens {1e3 * self.stroke:.0f} mm"

@@ -11,10 +11,10 @@ from tiny_products import bolted, box, product_of, rod, to_trimesh
 from cell.errors import CellError
 from cell.products.product import Part, Product
 from planning import plan
+from planning.feasibility.cad_threads import find_thread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.matrices import matrices_of
 from planning.feasibility.solids import Solid
-from planning.feasibility.threads import find_thread
 
 TOLERANCE = 5e-5
 
@@ -52,9 +52,9 @@ def test_a_bolt_leaves_along_its_thread_only():
     matrices = matrices_of(undeclared(2.5))
     names = list(matrices.solids)
     bolt, base = names.index("bolt"), names.index("base")
-    free = [j for j in DIRECTIONS if matrices.leaving.free[j][bolt, base]]
+    free = [j for j in DIRECTIONS if matrices.interference.free[j][bolt, base]]
     assert free == ["+z"] and matrices.contact[base, bolt] == 1
-    blocked = {(b.direction) for b in matrices.leaving.blockers if b.moving == "bolt"}
+    blocked = {(b.direction) for b in matrices.interference.blockers if b.moving == "bolt"}
     assert "+z" not in blocked
 
 
@@ -127,7 +127,7 @@ def test_a_layer_thicker_than_the_tolerance_is_refused(sink, tilt):
 @pytest.mark.parametrize("sink", [0.02, 0.045])
 def test_a_thinner_layer_is_a_fit(sink):
     plate, cube = box((40, 40, 10), (-20, -20, 0)), box((10, 10, 10), (-5, -5, 10 - sink))
-    free = matrices_of(product_of({"plate": plate, "cube": cube}), TOLERANCE).leaving.free
+    free = matrices_of(product_of({"plate": plate, "cube": cube}), TOLERANCE).interference.free
     assert [j for j in DIRECTIONS if free[j][1, 0]] == ["+x", "-x", "+y", "-y", "+z"]
 
 
@@ -137,7 +137,7 @@ def test_a_fine_thread_of_one_to_two_tolerances_is_a_fastener(thread):
     matrices = matrices_of(undeclared(thread), TOLERANCE)
     (found,) = matrices.threads
     assert (found.bolt, found.nut) == ("bolt", "base")
-    assert [j for j in DIRECTIONS if matrices.leaving.free[j][2, 0]] == ["+z"]
+    assert [j for j in DIRECTIONS if matrices.interference.free[j][2, 0]] == ["+z"]
 
 
 @pytest.mark.parametrize(
@@ -166,4 +166,4 @@ def test_bolts_drawn_on_their_holes_leave(facets, diameter, places, overlap):
     matrices = matrices_of(Product("tiny", parts), TOLERANCE)
     assert len(matrices.threads) == (len(places) if overlap else 0)
     for bolt in range(1, 1 + len(places)):
-        assert [j for j in DIRECTIONS if matrices.leaving.free[j][bolt, 0]] == ["+z"]
+        assert [j for j in DIRECTIONS if matrices.interference.free[j][bolt, 0]] == ["+z"]

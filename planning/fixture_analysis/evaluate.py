@@ -1,0 +1,285 @@
+"""Evaluation of one candidate at a time: the tests, cheapest first, then the scores."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from functools import cached_property
+
+import numpy as np
+
+from cell.products.product import Product
+from planning.feasibility.directions import axis_index, rotation_with_up, unit_vector
+from planning.feasibility.matrices import AssemblyMatrices
+from planning.feasibility.solids import combined_cog
+from planning.fixture_analysis.candidate import Candidate, FixtureSetup, Proposal
+from planning.fixture_analysis.capacity import sideways_capacity, turning_capacity
+from planning.fixture_analysis.footprint import footprint, standing_points
+from planning.fixture_analysis.grip import GripAnalysis
+from planning.fixture_analysis.imprint import Imprint, PartSurface, depth_in_bed, press, samples_of
+from planning.fixture_analysis.loads import operation_load
+from planning.fixture_analysis.support import SupportAnalysis
+
+GRAVITY = 9.81  # [m/s2]
+BED_YIELDS = 0.001  # [m] [A] One bead: less overlap than that is within bed compliance and grid.
+MAX_EXCESS = 0.05  # [A] Share of the imprint's volume that the bed may fail to take up: less than
+# the change of its own packing.
+
+
+class Rejected(Exception):
+    """A candidate fails a test; the message says why."""
+
+
+class Evaluator:
+    """Evaluates candidates, and caches what several of them share."""
+
+    def __init__(self, product: Product, matrices: AssemblyMatrices, setup: FixtureSetup) -> None:
+        self.product, self.matrices, self.setup = product, matrices, setup
+        self.support = SupportAnalysis(product, matrices)
+        self.grip = GripAnalysis(product, matrices.solids, setup.gripper_stroke)
+        self._lows: dict[tuple[str, bytes], float] = {}
+        self._samples: dict[str, PartSurface] = {}
+        self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
+
+    def evaluate(self, proposal: Proposal) -> Candidate:
+        """Run the tests and return the candidate with figures, and scores or the reason."""
+        evaluation = _Evaluation(self, proposal)
+        scores: dict[str, float] = {}
+        rejected = ""
+        try:
+            scores = evaluation.scores()
+        except Rejected as reason:
+            rejected = str(reason)
+        return Candidate(
+            proposal.name,
+            proposal.body,
+            proposal.moved,
+            proposal.up,
+            proposal.approach,
+            evaluation.figures,
+            scores,
+            rejected,
+            tuple(evaluation.notes),
+        )
+
+    def lowest(self, names: Sequence[str], R_JA: np.ndarray) -> float:
+        """Return the height of the lowest point of parts, turned [m]."""
+        key = R_JA.tobytes()
+        for name in (name for name in names if (name, key) not in self._lows):
+            vertices = self.matrices.solids[name].vertices
+            self._lows[name, key] = float((vertices @ R_JA[2]).min())
+        return min(self._lows[name, key] for name in names)
+
+    def surface(self, name: str) -> PartSurface:
+        """Return points on a part's surface."""
+        if name not in self._samples:
+            self._samples[name] = samples_of(self.matrices.solids[name])
+        return self._samples[name]
+
+    def imprint(
+        self, body: Sequence[str], up: str, R_JA: np.ndarray, p_middle: np.ndarray
+    ) -> Imprint:
+        """Return the imprint of a body; parts far above the bed do not change it."""
+        reach = self.lowest(body, R_JA) + self.setup.jig.bag.cap_height
+        reaching = tuple(name for name in body if self.lowest((name,), R_JA) <= reach)
+        key = reaching, up, p_middle.tobytes()
+        if key not in self._imprints:
+            parts = [self.surface(name) for name in reaching]
+            force = self.setup.press_force
+            self._imprints[key] = press(parts, R_JA, p_middle, self.setup.jig, force)
+        return self._imprints[key]
+
+
+class _Evaluation:
+    """One candidate under evaluation, with its figures and notes so far."""
+
+    def __init__(self, shared: Evaluator, proposal: Proposal) -> None:
+        self.shared, self.proposal = shared, proposal
+        self.solids, self.setup = shared.matrices.solids, shared.setup
+        self.R_JA = rotation_with_up(proposal.up).matrix()
+        self.figures: dict[str, float] = {}
+        self.notes: list[str] = []
+
+    @cached_property
+    def p_middle(self) -> np.ndarray:
+        """Point (2,) of the body, turned, over the middle of the bag [m].
+
+        It is the centre of gravity, rounded to a millimetre so that growing bodies share imprints.
+        """
+        return np.round((self.R_JA @ combined_cog(self.solids, self.proposal.body))[:2], 3) + 0.0
+
+    @cached_property
+    def low(self) -> float:
+        """Height of the body's lowest point, turned [m]."""
+        return self.shared.lowest(self.proposal.body, self.R_JA)
+
+    def scores(self) -> dict[str, float]:
+        """Return the scores, filling in figures and notes.
+
+        Raises:
+            Rejected: A test fails.
+        """
+        approach = self.proposal.approach
+        if approach == "below":
+            raise Rejected("the moved parts would have to come from below, through the jig")
+        self._check_connected()
+        width = self._grip_width()
+        diameter = self._footprint_diameter()
+        self._check_balance()
+        imprint = self._imprint()
+        self._check_clearance(imprint)
+        tilt = self._tilt(imprint)
+        margin = self._holding_margin(imprint)
+        bag = self.setup.jig.bag
+        return {
+            "reach": 1.0 if approach == "above" else 0.5,
+            "stability": tilt / (np.pi / 2),
+            "footprint": 1.0 - diameter / (2 * bag.aperture_radius),
+            "imprint": 1.0 - imprint.depth / (bag.cap_height - bag.floor),
+            "holding": margin / (1.0 + margin),
+            "gripper": max(0.0, 1.0 - width / self.setup.gripper_stroke),
+            "continuity": float(self.proposal.held or self.proposal.empty),
+        }
+
+    def _check_connected(self) -> None:
+        support, body, moved = self.shared.support, self.proposal.body, self.proposal.moved
+        pieces = len(support.components(body))
+        if pieces > 1:
+            raise Rejected(f"its {pieces} pieces are not connected: there is no one body to fix")
+        if fallen := support.falling(body, self.proposal.up):
+            raise Rejected(f"{_listed(fallen)} would fall off it")
+        if dropped := support.dropped(moved, self.proposal.up):
+            raise Rejected(f"{_listed(dropped)} would drop out of the moved parts")
+
+    def _grip_width(self) -> float:
+        """Return the largest width that must be gripped [m]."""
+        bodies = self.shared.support.components(self.proposal.moved)
+        widths = []
+        for parts in bodies + ([] if self.proposal.held else [self.proposal.body]):
+            width, obstacle = self.shared.grip.width(parts, self.R_JA)
+            if obstacle:
+                raise Rejected(f"{_listed(parts)} cannot be gripped in this posture: {obstacle}")
+            widths.append(width)
+        self.figures["grip_width_m"] = max(widths)
+        return max(widths)
+
+    def _footprint_diameter(self) -> float:
+        """Return the diameter of the circle around the footprint [m]."""
+        solids = [self.solids[name] for name in self.proposal.body]
+        outline = footprint(standing_points(solid.vertices @ self.R_JA.T for solid in solids))
+        diameter = 0.0 if outline is None else outline.circle[1]
+        self.figures["footprint_diameter_m"] = diameter
+        aperture = 2 * self.setup.jig.bag.aperture_radius
+        if diameter > aperture:
+            raise Rejected(
+                f"its footprint is {1e3 * diameter:.1f} mm across, the bag's aperture "
+                f"{1e3 * aperture:.1f} mm"
+            )
+        return diameter
+
+    def _check_balance(self) -> None:
+        """Reject a body whose bounding box, seen from above, the common CoG is outside of."""
+        solids = [self.solids[name] for name in self.proposal.body]
+        low = np.min([solid.lower for solid in solids], axis=0)
+        high = np.max([solid.upper for solid in solids], axis=0)
+        p_G = combined_cog(self.solids, self.proposal.body + self.proposal.moved)
+        beyond = np.delete(np.maximum(low - p_G, p_G - high), axis_index(self.proposal.up)).max()
+        if beyond > 0.0:
+            raise Rejected(f"the common centre of gravity is {1e3 * beyond:.1f} mm outside of it")
+
+    def _imprint(self) -> Imprint:
+        """Press the body into the bed."""
+        up, press_force = self.proposal.up, self.setup.press_force
+        imprint = self.shared.imprint(self.proposal.body, up, self.R_JA, self.p_middle)
+        self.figures |= {"depth_m": imprint.depth, "imprint_volume_m3": imprint.volume}
+        if imprint.force < press_force:
+            raise Rejected(f"it sinks to the base plate before the bed bears {press_force:g} N")
+        if imprint.excess > MAX_EXCESS * imprint.volume:
+            raise Rejected(
+                f"the bed around it cannot take up {1e6 * imprint.excess:.1f} of the "
+                f"{1e6 * imprint.volume:.1f} cm3 of beads that it displaces"
+            )
+        return imprint
+
+    def _check_clearance(self, imprint: Imprint) -> None:
+        """Reject moved parts that end inside the frozen bed; a loose bolt may protrude instead."""
+        protruding: dict[str, float] = {}
+        for name in self.proposal.moved:
+            lowest = self.shared.lowest((name,), self.R_JA)
+            if lowest > self.low + self.setup.jig.bag.cap_height:
+                continue
+            surface = self.shared.surface(name)
+            depth = depth_in_bed(imprint, surface, self.R_JA, self.p_middle, self.low)
+            if depth <= BED_YIELDS:
+                continue
+            if self.proposal.approach != "above" or depth > self._engagement(name):
+                raise Rejected(f"{name} would end {1e3 * depth:.0f} mm inside the frozen bed")
+            protruding[name] = depth
+        if protruding:
+            most = 1e3 * max(protruding.values())
+            self.notes.append(
+                f"inserted loosely, {_listed(list(protruding))} may protrude by up to {most:.1f} "
+                "mm from the seat: the frozen bed is below"
+            )
+
+    def _engagement(self, name: str) -> float:
+        """Return how far a bolt that is only inserted may protrude and still be in its hole [m]."""
+        screw, body = self.shared.product.screws.get(name), self.proposal.body
+        if screw is None or screw.into in body or screw.clamps not in body:
+            return 0.0
+        axis = unit_vector(self.proposal.up)
+        bolt, held = (self.solids[n].vertices @ axis for n in (name, screw.clamps))
+        return float(min(bolt.max(), held.max()) - max(bolt.min(), held.min()))
+
+    def _tilt(self, imprint: Imprint) -> float:
+        """Return the angle of tilt at which the body, alone or combined, tips over [rad]."""
+        angles = []
+        body, both = self.proposal.body, self.proposal.body + self.proposal.moved
+        for names, what in ((body, "body"), (both, "both")):
+            p_G = self.R_JA @ combined_cog(self.solids, names)
+            outline = imprint.contact
+            inside = -np.inf if outline is None else outline.margin(p_G[:2] - self.p_middle)
+            self.figures[f"cog_height_{what}_m"] = float(p_G[2]) - self.low
+            if inside <= 0.0:
+                of = "its centre of gravity" if what == "body" else "the common centre of gravity"
+                outside = max(0.0, -1e3 * inside)
+                raise Rejected(f"{of} is {outside:.1f} mm outside its support area")
+            angles.append(np.arctan2(inside, p_G[2] - self.low))
+        self.figures["lean_angle_rad"] = float(min(angles))
+        return self.figures["lean_angle_rad"]
+
+    def _holding_margin(self, imprint: Imprint) -> float:
+        """Return the sideways force that the body withstands, per force of the operation."""
+        body, jig = self.proposal.body, self.setup.jig
+        p_G = (self.R_JA @ combined_cog(self.solids, body))[:2] - self.p_middle
+        weight = GRAVITY * sum(self.solids[name].mass for name in body)
+        margins = []
+        for piece in self.shared.support.components(self.proposal.moved):
+            load = operation_load(
+                self.shared.product,
+                self.solids,
+                self.setup,
+                self.proposal,
+                piece,
+                self.p_middle,
+                self.low,
+            )
+            capacity = sideways_capacity(imprint, jig, weight, p_G, load)
+            margins.append((capacity / load.sideways, capacity, load))
+        margin, capacity, load = min(margins, key=lambda entry: entry[0])
+        self.figures |= {"bears_across_N": capacity, "pushed_across_N": load.sideways}
+        if margin < 1.0:
+            raise Rejected(
+                f"it withstands {capacity:.1f} N sideways at that height, the operation may exert "
+                f"{load.sideways:.1f} N"
+            )
+        turning = turning_capacity(imprint, jig, weight, load)
+        if load.torque > turning:
+            self.notes.append(
+                f"a counter-hold against {load.torque:.2f} N m is needed: friction under it "
+                f"withstands {turning:.2f} N m"
+            )
+        return margin
+
+
+def _listed(names: Sequence[str]) -> str:
+    return ", ".join(names) if len(names) <= 3 else f"{names[0]} and {len(names) - 1} others"
