@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from pydrake.systems.framework import Context, EventStatus, LeafSystem
+from pydrake.systems.framework import Context, DiscreteValues, EventStatus, LeafSystem
 
 from cell.errors import InputError
 
@@ -26,7 +26,9 @@ class Stepper(Protocol):
 
 
 class StepCounter(LeafSystem):
-    """Remembers in the Context how many plant steps the monitor has seen, -1 before the first call.
+    """Remembers in the Context how many plant steps the monitor has seen, and whether it ever came.
+
+    `Simulator.Initialize` lets the count begin anew at the Context's time, whatever that is.
 
     Args:
         time_step: Of the plant [s].
@@ -35,26 +37,47 @@ class StepCounter(LeafSystem):
     def __init__(self, time_step: float) -> None:
         super().__init__()
         self.time_step = time_step
-        self.DeclareDiscreteState([-1.0])
+        self._seen = self.DeclareDiscreteState([0.0])
+        self._ready = self.DeclareDiscreteState([0.0])  # 1 after the monitor's first call.
+        self.DeclareInitializationDiscreteUpdateEvent(self._begin)
         self.DeclarePerStepPublishEvent(self._check)
 
     def steps_at(self, context: Context) -> int:
-        """Return the number of whole plant steps up to a Context's time."""
-        return int(context.get_time() / self.time_step + 1e-6)
+        """Return the number of plant steps up to a Context's time; the first one begins at 0 s."""
+        return int(max(context.get_time(), 0.0) / self.time_step + 1e-6)
 
     def seen(self, root: Context) -> int:
         """Return how many steps the monitor has seen."""
-        return int(self.GetMyContextFromRoot(root).get_discrete_state(0).value()[0])
+        return self._seen_in(self.GetMyContextFromRoot(root))
 
     def set_seen(self, root: Context, steps: int) -> None:
         """Remember how many steps the monitor has seen."""
-        self.GetMyMutableContextFromRoot(root).SetDiscreteState(0, [float(steps)])
+        self.GetMyMutableContextFromRoot(root).SetDiscreteState(self._seen, [float(steps)])
+
+    def ready(self, root: Context) -> bool:
+        """Return whether the monitor has put this Context into its initial state."""
+        return self._ready_in(self.GetMyContextFromRoot(root))
+
+    def set_ready(self, root: Context) -> None:
+        """Remember that it has."""
+        self.GetMyMutableContextFromRoot(root).SetDiscreteState(self._ready, [1.0])
+
+    def _seen_in(self, context: Context) -> int:
+        return int(context.get_discrete_state(self._seen).value()[0])
+
+    def _ready_in(self, context: Context) -> bool:
+        return bool(context.get_discrete_state(self._ready).value()[0])
+
+    def _begin(self, context: Context, state: DiscreteValues) -> None:
+        state.set_value(self._seen, [float(self.steps_at(context))])
 
     def _check(self, context: Context) -> None:
-        if self.steps_at(context) > int(context.get_discrete_state(0).value()[0]) + 1:
+        behind = self.steps_at(context) - self._seen_in(context)
+        if behind > (1 if self._ready_in(context) else 0):
             raise InputError(
                 "The cell is stepped without its monitor: neither fixture nor threads would work. "
-                "Call simulator.set_monitor(cell.monitor) before the first step."
+                "Call simulator.set_monitor(cell.monitor) before simulator.Initialize() and the "
+                "first step."
             )
 
 
@@ -89,6 +112,7 @@ class Monitor:
         `Simulator.Initialize` does it through the monitor; call it yourself before the first
         command to a Context that has no simulator yet.
         """
-        if self.counter.seen(root) < 0:
+        if not self.counter.ready(root):
             self._reset(root)
+            self.counter.set_ready(root)
             self.counter.set_seen(root, self.counter.steps_at(root))

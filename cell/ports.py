@@ -15,6 +15,7 @@ from pydrake.systems.framework import (
     InputPort,
     LeafSystem,
     OutputPort,
+    PortDataType,
 )
 
 from cell.errors import InputError, UnknownName
@@ -42,19 +43,24 @@ class Ports:
         """Connect a caller's output to an input of the cell.
 
         Raises:
-            InputError: No such input, something is connected to it already, or another size.
+            InputError: No such input, something is connected to it already, another size or type,
+                or a system that is not in this builder.
         """
         if name not in self.inputs:
             raise UnknownName("input of the cell", name, self.inputs)
         port = self.inputs[name]
         if builder.IsConnectedOrExported(port):
             raise InputError(f"Input '{name}' of the cell is connected already.")
-        if source.size() != port.size():
+        mine = f"'{source.get_system().get_name()}.{source.get_name()}'"
+        if source.get_data_type() != port.get_data_type() or source.size() != port.size():
             raise InputError(
-                f"Input '{name}' of the cell takes {port.size()} numbers, "
-                f"not the {source.size()} of '{source.GetFullDescription()}'."
+                f"Input '{name}' of the cell takes {_kind(port)}; {mine} is {_kind(source)}."
             )
-        builder.Connect(source, port)
+        try:
+            builder.Connect(source, port)
+        except RuntimeError as error:
+            reason = str(error).splitlines()[0]
+            raise InputError(f"{mine} cannot be connected to input '{name}': {reason}") from error
 
     def output(self, name: str) -> OutputPort:
         """Return an output by its name."""
@@ -68,6 +74,12 @@ class Ports:
             builder.ExportInput(port, name)
         for name, port in self.outputs.items():
             builder.ExportOutput(port, name)
+
+
+def _kind(port: InputPort | OutputPort) -> str:
+    """Return what a port carries."""
+    vector = port.get_data_type() == PortDataType.kVectorValued
+    return f"a vector of {port.size()}" if vector else "an abstract value"
 
 
 class PartPoses(LeafSystem):

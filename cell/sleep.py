@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from math import inf
 from typing import Any
 
 from pydrake.common.value import AbstractValue, Value
@@ -40,7 +41,7 @@ class SleepMemory:
 
     loads: dict[str, Forces] = field(default_factory=dict)
     latest: dict[str, Forces] = field(default_factory=dict)
-    restored_at: float = 0.0
+    restored_at: float = -inf
 
 
 class Sleep(LeafSystem):
@@ -62,21 +63,21 @@ class Sleep(LeafSystem):
         self._bearers = tuple(bearers)
         joints = map(plant.get_joint, plant.GetJointIndices())
         self._joints = {int(joint.child_body().index()): joint for joint in joints}
-        self._index = self.DeclareAbstractState(Value[object](SleepMemory()))
+        self._index = self.DeclareAbstractParameter(Value[object](SleepMemory()))
         self.DeclareAbstractOutputPort(
-            "loads", no_forces, self._calc_loads, {self.all_state_ticket()}
+            "loads", no_forces, self._calc_loads, {self.all_parameters_ticket()}
         )
 
     def memory(self, root: Context) -> SleepMemory:
         """Return what is remembered in a Context of the diagram; not to be changed."""
-        return self.GetMyContextFromRoot(root).get_abstract_state(self._index).get_value()
+        return self.GetMyContextFromRoot(root).get_abstract_parameter(self._index).get_value()
 
     def _changed(self, root: Context) -> SleepMemory:
         context = self.GetMyMutableContextFromRoot(root)
-        return context.get_mutable_abstract_state(self._index).get_mutable_value()
+        return context.get_mutable_abstract_parameter(self._index).get_mutable_value()
 
     def _calc_loads(self, context: Context, output: AbstractValue) -> None:
-        memory: SleepMemory = context.get_abstract_state(self._index).get_value()
+        memory: SleepMemory = context.get_abstract_parameter(self._index).get_value()
         output.set_value([force for forces in memory.loads.values() for force in forces])
 
     def put_to_sleep(
@@ -124,7 +125,7 @@ class Sleep(LeafSystem):
     def _load_of(self, root: Context, body: RigidBody) -> Forces:
         """Return the forces that a body exerted on the bearers in the latest step."""
         memory, name = self.memory(root), body.scoped_name().get_full()
-        if root.get_time() <= memory.restored_at:
+        if root.get_time() == memory.restored_at:
             return memory.latest.get(name, [])
         return list(self._contact_forces(root, body))
 

@@ -35,8 +35,8 @@ from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 from trimesh.exchange.obj import export_obj
 
-from cell.fixtures.soft_jig import JigParameters, JigState, SoftJig
-from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.soft_jig import JigParameters, SoftJig
+from cell.fixtures.soft_jig.memory import JigMemory
 from cell.fixtures.wiring import wire_fixture
 from cell.forces import applied_force
 from cell.monitor import Monitor, StepCounter
@@ -220,11 +220,6 @@ class Rig:
         self.forces.fix(self.context, "external", [])
 
     @property
-    def bed(self) -> Bed:
-        """The bed of beads, as it is now."""
-        return self.jig.memory(self.context).bed
-
-    @property
-    def state(self) -> JigState:
-        """State of the jig."""
-        return self.jig.memory(self.context).state
+    def memory(self) -> JigMemory:
+        """What the jig remembers, as it is now: bed, state, pressure, forces."""
+        return self.jig.memory(self.context)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from enum import Enum
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
@@ -15,6 +17,10 @@ LIMIT = np.array([1.0, 1.0, 1.0, 15.0, 15.0, 10.0])
 X_FC = RigidTransform([0.0, 0.02, 0.01])
 
 
+class Kind(Enum):
+    GO = "go"
+
+
 @pytest.fixture
 def simulation(motor_unit_cell: Cell) -> Simulation:
     return Simulation(motor_unit_cell)
@@ -22,17 +28,17 @@ def simulation(motor_unit_cell: Cell) -> Simulation:
 
 def centre(simulation: Simulation) -> RigidTransform:
     """Return the pose of the compliance centre."""
-    return simulation.cell.left.frame("tip").CalcPoseInWorld(simulation.context) @ X_FC
+    return simulation.cell.holder.frame("tip").CalcPoseInWorld(simulation.context) @ X_FC
 
 
 def spring(simulation: Simulation, X_WD: RigidTransform, **changes: np.ndarray) -> Impedance:
-    frame = simulation.cell.left.frame("tip")
+    frame = simulation.cell.holder.frame("tip")
     return Impedance(frame, X_FC, lambda _: X_WD, STIFFNESS, LIMIT, **changes)
 
 
 def wrench_at_centre(simulation: Simulation, command: Impedance) -> np.ndarray:
     """Return the wrench (6,) in W that the joint torques would hold at the compliance centre."""
-    arm, context = simulation.cell.left, simulation.context
+    arm, context = simulation.cell.holder, simulation.context
     torque = impedance_torque(arm, context, command, 0.0)
     jacobian = arm.jacobian(context, command.frame, X_FC.translation())
     return np.linalg.solve(jacobian.T, torque)
@@ -52,7 +58,7 @@ def displaced(X_WC: RigidTransform, axis: int, amount: float) -> RigidTransform:
 
 def test_no_torque_at_the_target(simulation: Simulation) -> None:
     command = spring(simulation, centre(simulation))
-    torque = impedance_torque(simulation.cell.left, simulation.context, command, 0.0)
+    torque = impedance_torque(simulation.cell.holder, simulation.context, command, 0.0)
     np.testing.assert_allclose(torque, np.zeros(6), atol=1e-9)
 
 
@@ -86,7 +92,7 @@ def test_bias_is_carried_on_top(simulation: Simulation) -> None:
 
 
 def test_damping_takes_power_from_every_motion(simulation: Simulation) -> None:
-    arm, plant, context = simulation.cell.left, simulation.cell.plant, simulation.context
+    arm, plant, context = simulation.cell.holder, simulation.cell.plant, simulation.context
     command = spring(simulation, centre(simulation))
     rng = np.random.default_rng(0)
     for _ in range(20):
@@ -98,11 +104,12 @@ def test_damping_takes_power_from_every_motion(simulation: Simulation) -> None:
 def test_free_hand_goes_to_the_target_and_stops_there(simulation: Simulation) -> None:
     """5 mm aside: a second later it is within 0.1 mm and slower than 1 mm/s."""
     goal = displaced(centre(simulation), 3, 5e-3)
-    phase = Phase("go", after(1.0), timeout=2.0, left=spring(simulation, goal))
+    commands = {simulation.cell.holder.name: spring(simulation, goal)}
+    phase = Phase(Kind.GO, after(1.0), timeout=2.0, commands=commands)
     simulation.run_phase(phase)
     error = centre(simulation).translation() - goal.translation()
     assert np.linalg.norm(error) < 1e-4
-    arm, frame = simulation.cell.left, simulation.cell.left.frame("tip")
+    arm, frame = simulation.cell.holder, simulation.cell.holder.frame("tip")
     jacobian = arm.jacobian(simulation.context, frame, X_FC.translation())
     assert np.linalg.norm((jacobian @ arm.velocities(simulation.context))[3:]) < 1e-3
-    assert not simulation.cell.left.in_torque_drive()
+    assert not simulation.cell.holder.drive.uses_torque(simulation.root)

@@ -44,7 +44,7 @@ def held(request):
 def test_part_is_let_go_without_a_kick(held) -> None:
     """Freezing and letting go move a part by less than 0.3 mm and 20 mm/s, and it comes to rest."""
     rig, kick, fastest, last = held
-    assert rig.jig.state is JigState.JAMMED
+    assert rig.jig.memory(rig.root).state is JigState.JAMMED
     assert kick < 0.3e-3
     assert fastest < 20e-3
     assert last < 1e-3
@@ -55,9 +55,10 @@ def test_imprint_is_the_parts_surface(held) -> None:
     rig, *_ = held
     samples = SurfaceSamples.of("surface", rig.part.mesh(), spacing=0.0005)
     surface = (rig.X_JP @ samples.points.T).T
-    bed = rig.jig.bed
-    touching = np.isfinite(rig.jig.bed.underside_over_bed("part"))
-    touching &= bed.underside_over_bed("part") < bed.heights + 1e-4
+    memory = rig.jig.memory(rig.root)
+    bed, (name,) = memory.bed, memory.pressing
+    touching = np.isfinite(bed.underside_over_bed(name))
+    touching &= bed.underside_over_bed(name) < bed.heights + 1e-4
     touched = np.column_stack([bed.x[touching], bed.y[touching], bed.heights[touching]])
     assert len(touched) * bed.bag.cell**2 > 1e-4
     distance, _ = KDTree(surface).query(touched)
@@ -67,7 +68,7 @@ def test_imprint_is_the_parts_surface(held) -> None:
 def test_part_rests_in_the_imprint(held) -> None:
     """Under its weight no contact polygon lies more than 0.3 mm below the frozen bed's surface."""
     rig, *_ = held
-    mesh = rig.jig.contact_mesh
+    mesh = rig.jig.memory(rig.root).mesh
     surface = mesh.vertices[mesh.boundary()]
     results = rig.plant.get_contact_results_output_port().Eval(rig.context)
     depths = []
@@ -83,7 +84,7 @@ def test_part_rests_in_the_imprint(held) -> None:
 def test_only_what_the_hulls_leave_out_is_a_pin(held) -> None:
     """Standing, 97 mm2 of rear boss and 77 of terminals; lying, what touches beyond its ends."""
     rig, *_ = held
-    (pins,) = rig.jig.holding.pins.values()
+    (pins,) = rig.jig.memory(rig.root).holding.pins.values()
     name, up = rig.part.part.name, rig.part.up
     if name == "plate":
         assert len(pins.areas) == 0

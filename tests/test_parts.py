@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pytest
@@ -14,6 +14,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell import load_product
 from cell.errors import UnknownName
+from cell.sleep import Sleep
 from cell.workpieces.parts import LoosePart, Parts, add_parts
 
 HIGH = RigidTransform([0.0, 0.0, 1.0])
@@ -28,8 +29,10 @@ class Air:
     def __post_init__(self) -> None:
         builder = DiagramBuilder()
         self.plant, self.scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)
-        self.parts = add_parts(self.plant, self.scene_graph, load_product("motor_unit"), HIGH)
+        parts = add_parts(self.plant, load_product("motor_unit"), HIGH)
         self.plant.Finalize()
+        sleeper = builder.AddNamedSystem("sleep", Sleep(self.plant, self.scene_graph, ()))
+        self.parts = replace(parts, sleeper=sleeper)
         self.simulator = Simulator(builder.Build())
         self.root = self.simulator.get_mutable_context()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
@@ -59,8 +62,8 @@ def air() -> Air:
 @pytest.fixture(autouse=True)
 def at_rest(air: Air) -> None:
     """Every test begins with all parts awake, at rest in mid-air, as they hang in the tray."""
-    for part in air.parts:
-        part.wake(air.root)
+    for name in air.parts.by_name:
+        air.parts.wake(air.root, name)
     air.root.SetTime(0.0)
     air.plant.SetDefaultState(air.context, air.context.get_mutable_state())
     air.simulator.Initialize()
@@ -91,39 +94,38 @@ def test_sleeping_part_stays_exactly_where_it_is(air: Air) -> None:
     air.step(50)
     np.testing.assert_array_equal(motor.X_WP(air.context).GetAsMatrix4(), pose)
     np.testing.assert_array_equal(motor.velocity(air.context), np.zeros(6))
-    assert motor.kinetic_energy(air.context) == 0.0
 
 
 def test_sleep_of_one_part_leaves_the_velocity_of_another(air: Air) -> None:
     V_WP = np.array([0.1, 0.2, 0.3, 0.4, 0.5, 0.6])
     set_velocity(air, air.parts["plate"], V_WP)
-    air.parts["motor"].sleep(air.root)
+    air.parts.sleep(air.root, "motor")
     np.testing.assert_allclose(air.parts["plate"].velocity(air.context), V_WP, atol=1e-12)
 
 
 def test_woken_part_starts_from_rest(air: Air) -> None:
     motor = air.parts["motor"]
     set_velocity(air, motor, np.ones(6))
-    motor.sleep(air.root)
-    motor.wake(air.root)
-    assert motor.kinetic_energy(air.context) == 0.0
+    air.parts.sleep(air.root, "motor")
+    air.parts.wake(air.root, "motor")
+    np.testing.assert_array_equal(motor.velocity(air.context), np.zeros(6))
     air.step(1)
     assert motor.velocity(air.context)[5] == pytest.approx(-9.81e-3, rel=1e-6)
 
 
 def test_sleeping_part_touches_nothing(air: Air) -> None:
     assert air.may_touch("motor", "plate")
-    air.parts["motor"].sleep(air.root)
+    air.parts.sleep(air.root, "motor")
     assert not air.may_touch("motor", "plate")
     assert air.may_touch("plate", "bolt_1")
-    air.parts["motor"].wake(air.root)
+    air.parts.wake(air.root, "motor")
     assert air.may_touch("motor", "plate")
 
 
 def test_falling_asleep_twice_needs_one_waking(air: Air) -> None:
     for action in ("sleep", "sleep", "wake", "wake"):
-        getattr(air.parts["motor"], action)(air.root)
-    assert not air.parts["motor"].asleep
+        getattr(air.parts, action)(air.root, "motor")
+    assert not air.parts["motor"].asleep(air.root)
     assert air.may_touch("motor", "plate")
 
 
@@ -139,35 +141,25 @@ def exclude_bolts(air: Air) -> None:
 
 
 def test_lasting_filters_can_be_set_while_parts_sleep() -> None:
-    """Inside, sleepers are unfiltered; afterwards they sleep again and the new filter stays."""
+    """Sleep neither hides them nor forgets them; it stays what it was itself."""
     air = Air()
-    air.parts.sleep_all_but(air.root, ["bolt_1", "bolt_2"])
-    with pytest.raises(RuntimeError):
-        exclude_bolts(air)
-    with air.parts.filters_lifted(air.root):
-        assert air.may_touch("motor", "plate")
-        exclude_bolts(air)
+    air.parts.sleep_all_but(air.root, ["bolt_1"])
+    exclude_bolts(air)
     assert not air.may_touch("motor", "plate")
-    assert air.parts["motor"].asleep
-    air.parts.sleep_all_but(air.root, [part.part.name for part in air.parts])
+    assert air.parts["motor"].asleep(air.root)
+    air.parts.sleep_all_but(air.root, air.parts.by_name)
     assert air.may_touch("motor", "plate")
+    assert air.may_touch("bolt_1", "bolt_3")
     assert not air.may_touch("bolt_1", "bolt_2")
 
 
-def test_filters_come_back_after_an_error(air: Air) -> None:
-    air.parts["motor"].sleep(air.root)
-    with pytest.raises(ZeroDivisionError), air.parts.filters_lifted(air.root):
-        raise ZeroDivisionError
-    assert air.parts["motor"].asleep
-    assert not air.may_touch("motor", "plate")
-
-
-def test_kinetic_energy_is_what_drake_says_of_a_lone_mover(air: Air) -> None:
-    plate = air.parts["plate"]
-    set_velocity(air, plate, np.array([3.0, -2.0, 1.0, 0.3, 0.2, -0.1]))
-    assert plate.kinetic_energy(air.context) == pytest.approx(
-        air.plant.CalcKineticEnergy(air.context), rel=1e-12
-    )
+def test_parts_sleep_in_one_context_only(air: Air) -> None:
+    other = air.root.Clone()
+    air.parts.sleep(air.root, "motor")
+    assert not air.parts["motor"].asleep(other)
+    copied = air.root.Clone()
+    air.parts.wake(air.root, "motor")
+    assert air.parts["motor"].asleep(copied)
 
 
 def test_unknown_part_is_named_with_the_known_ones(air: Air) -> None:

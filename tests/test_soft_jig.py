@@ -10,8 +10,9 @@ import trimesh
 from jig_rig import Rig
 from numpy.typing import NDArray
 
-from cell.fixtures.soft_jig import JigParameters, JigState, SurfaceSamples
-from cell.fixtures.soft_jig.drake_values import JigError
+from cell.errors import InputError
+from cell.fixtures.base import FixtureError
+from cell.fixtures.soft_jig import JigParameters, JigState
 from cell.fixtures.soft_jig.parameters import VacuumParameters
 
 # A short press that still reaches the drive's limit of 20 N.
@@ -39,7 +40,7 @@ class Held:
 def held() -> Held:
     rig = Rig()
     rig.press(**FAST)
-    volume = rig.jig.bed.volume
+    volume = rig.memory.bed.volume
     rig.jam()
     rig.step(100)
     before = rig.X_JM.translation()
@@ -60,17 +61,17 @@ def test_states_follow_the_commands_and_the_pressure() -> None:
     rig = Rig()
     vacuum = rig.params.vacuum
     rig.jig.inflate(rig.context)
-    assert rig.jig.state is JigState.INFLATED
+    assert rig.memory.state is JigState.INFLATED
     rig.jig.evacuate(rig.context)
-    assert rig.jig.state is JigState.SOFT
+    assert rig.memory.state is JigState.SOFT
     rig.step(250)
-    assert rig.jig.pressure == pytest.approx(vacuum.pressure * (1 - np.exp(-1)), rel=1e-6)
+    assert rig.memory.pressure == pytest.approx(vacuum.pressure * (1 - np.exp(-1)), rel=1e-6)
     rig.jam()
     assert rig.context.get_time() == pytest.approx(-0.25 * np.log(0.05), abs=2e-3)
     rig.jig.soften(rig.context)
-    assert rig.jig.state is JigState.SOFT
+    assert rig.memory.state is JigState.SOFT
     rig.step(100)
-    assert rig.jig.pressure < vacuum.pressure
+    assert rig.memory.pressure < vacuum.pressure
 
 
 def test_part_is_let_go_without_a_kick(held: Held) -> None:
@@ -87,14 +88,14 @@ def test_frozen_bed_carries_the_part_at_rest(held: Held) -> None:
     assert results.num_hydroelastic_contacts() == 1
     assert results.num_point_pair_contacts() == 0
     force = results.hydroelastic_contact_info(0).F_Ac_W().translational()
-    suction = held.rig.jig.applied_forces[0].F_Bq_W.translational()[2]
+    suction = held.rig.memory.forces[0].F_Bq_W.translational()[2]
     assert suction < 0
     assert abs(force[2]) == pytest.approx(0.195 * 9.81 - suction, rel=0.02)
 
 
 def test_bed_keeps_its_volume(held: Held) -> None:
     """Collar, dilation and contraction account for it from inflation to the frozen bed."""
-    bed = held.rig.jig.bed
+    bed = held.rig.memory.bed
     rest = type(bed)(bed.bag, bed.soil).volume
     assert held.pressed_volume == pytest.approx(rest + bed.ledger.dilated, rel=0.01)
     assert bed.volume == pytest.approx(rest + bed.ledger.dilated - bed.contracted, rel=1e-9)
@@ -120,22 +121,25 @@ def test_half_the_step_gives_the_same_depth() -> None:
 
 
 def test_restored_state_continues_bit_for_bit() -> None:
-    """In the middle of pressing and across the freezing; the Context is put back as well."""
+    """In the middle of pressing and across the freezing, from a copied Context or from arrays."""
     rig = Rig()
     rig.press(speed=0.04, duration=0.35)
     rig.jig.evacuate(rig.context)
     rig.step(13)
-    context, jig = rig.context.Clone(), rig.jig.save_state()
+    context, saved = rig.context.Clone(), rig.jig.save(rig.context)
     rig.step(850)
-    first, heights = full_state(rig), rig.jig.bed.heights.copy()
-    assert rig.jig.state is JigState.JAMMED
-    rig.context.SetTimeStateAndParametersFrom(context)
-    rig.jig.restore_state(rig.context, jig)
-    rig.simulator.Initialize()
-    assert rig.jig.state is JigState.SOFT
-    rig.step(850)
-    assert np.array_equal(full_state(rig), first)
-    assert np.array_equal(rig.jig.bed.heights, heights)
+    first, heights = full_state(rig), rig.memory.bed.heights.copy()
+    assert rig.memory.state is JigState.JAMMED
+    for from_arrays in (False, True):
+        rig.context.SetTimeStateAndParametersFrom(context)
+        if from_arrays:
+            rig.jig.inflate(rig.context)
+            rig.jig.restore(rig.context, saved)
+        rig.simulator.Initialize()
+        assert rig.memory.state is JigState.SOFT
+        rig.step(850)
+        assert np.array_equal(full_state(rig), first)
+        assert np.array_equal(rig.memory.bed.heights, heights)
 
 
 def test_frozen_part_resists_torque_and_side_load(held: Held) -> None:
@@ -144,7 +148,7 @@ def test_frozen_part_resists_torque_and_side_load(held: Held) -> None:
     held.rig.pull((3.0, 0.0, 0.0), (0.0, 0.0, 0.1), (0.0, 0.0, -0.0267))
     held.rig.step(300)
     moved = start.InvertAndCompose(held.rig.X_JM)
-    held.rig.extra = []
+    held.rig.unload()
     held.rig.step(200)
     assert np.linalg.norm(moved.translation()) < 1e-3
     assert np.degrees(moved.rotation().ToAngleAxis().angle()) < 1.0
@@ -155,31 +159,39 @@ def test_letting_air_in_keeps_the_part_where_it_is(held: Held) -> None:
     height = held.rig.X_JM.translation()[2]
     held.rig.jig.soften(held.rig.context)
     held.rig.step(500)
-    assert held.rig.jig.state is JigState.SOFT
+    assert held.rig.memory.state is JigState.SOFT
     assert held.rig.X_JM.translation()[2] == pytest.approx(height, abs=1e-3)
     assert np.linalg.norm(held.rig.velocity) < 5e-3
-    up = [force.F_Bq_W.translational()[2] for force in held.rig.jig.applied_forces]
+    up = [force.F_Bq_W.translational()[2] for force in held.rig.memory.forces]
     assert up[0] == pytest.approx(0.195 * 9.81, rel=0.05)
     assert sum(up) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_inflating_wipes_the_imprint(held: Held) -> None:
     held.rig.jig.inflate(held.rig.context)
-    bed = held.rig.jig.bed
+    bed = held.rig.memory.bed
     assert bed.heights.max() == pytest.approx(JigParameters().bag.cap_height)
-    assert held.rig.jig.state is JigState.INFLATED
+    assert held.rig.memory.state is JigState.INFLATED
 
 
 def test_part_without_a_surface_for_the_bed_is_refused(held: Held) -> None:
     """It would fall through the frozen bed."""
     carriage = held.rig.plant.GetBodyByName("carriage")
-    with pytest.raises(JigError, match="carriage.*bed_"):
-        held.rig.jig.press_with(
-            carriage, SurfaceSamples.of("carriage", trimesh.creation.box((0.01, 0.01, 0.01)))
-        )
+    with pytest.raises(FixtureError, match="carriage.*bed_"):
+        held.rig.jig.receive(held.rig.context, carriage, trimesh.creation.box((0.01,) * 3))
+
+
+def test_a_vacuum_beyond_the_pump_is_refused_and_none_leaves_the_bag_soft(held: Held) -> None:
+    rig = held.rig
+    for pressure in (-1.0, 90001.0):
+        with pytest.raises(InputError, match="beyond the pump: it draws 0 to 90000 Pa"):
+            rig.jig.evacuate(rig.context, pressure)
+    rig.jig.evacuate(rig.context, 0.0)
+    assert rig.memory.target == 0.0
+    assert rig.memory.state is JigState.SOFT
 
 
 def test_imprint_closes_with_the_vacuum() -> None:
     """Beads contract with about p^0.7: not at all where nothing is pumped out, half at 30 kPa."""
-    shares = [VacuumParameters(pressure=pressure).closing for pressure in (0.0, 30e3, 90e3)]
+    shares = [VacuumParameters().closing(pressure) for pressure in (0.0, 30e3, 90e3)]
     assert shares == pytest.approx([0.0, 0.463, 1.0], abs=1e-3)

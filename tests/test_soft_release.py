@@ -31,7 +31,7 @@ def released(posture: str, time_step: float):
 def test_part_comes_to_rest_on_the_soft_bed(posture: str) -> None:
     """Let go at once after a press by 20 N; below 2 mm/s, carried, and most of the depth kept."""
     rig, pressed, speeds = released(posture, 1e-3)
-    assert rig.jig.state is JigState.SOFT
+    assert rig.jig.memory(rig.root).state is JigState.SOFT
     assert speeds[-100:].max() < 2e-3
     assert rig.depth > 0.75 * pressed
     weight = rig.body.default_mass() * 9.81

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from cell import Cell, Simulation
-from cell.simulation.events import soften_jig
+from cell.simulation.events import receive_part
 from cell.simulation.state import read_state, restore_state, save_state, write_state
 
 STEPS = 50
@@ -24,13 +24,13 @@ def history(simulation: Simulation) -> np.ndarray:
     return np.array(rows)
 
 
-def under_way(cell: Cell, seed: int = 0) -> Simulation:
+def under_way(cell: Cell) -> Simulation:
     """Return a run with motor and bolt awake, the jaws closing, the spindle turning, a soft bag."""
-    simulation = Simulation(cell, seed)
+    simulation = Simulation(cell)
     cell.parts.sleep_all_but(simulation.root, ["motor", "bolt_3"])
-    cell.gripper.command(simulation.root, 0.03, 10.0)
-    cell.driver.command(simulation.root, 20.0)
-    soften_jig("motor")(simulation)
+    cell.holder.tool.command(simulation.root, 0.03, 10.0)
+    cell.driver.tool.command(simulation.root, 20.0)
+    receive_part("motor")(simulation)
     for _ in range(20):
         simulation.step()
     return simulation
@@ -53,7 +53,7 @@ def test_continuing_is_bit_identical_in_the_same_and_in_a_new_simulation(
 
 
 def test_restored_state_saves_to_the_same_arrays(motor_unit_cell: Cell) -> None:
-    state = save_state(under_way(motor_unit_cell, seed=5))
+    state = save_state(under_way(motor_unit_cell))
     fresh = Simulation(motor_unit_cell)
     restore_state(fresh, state)
     again = save_state(fresh)
@@ -65,30 +65,12 @@ def test_restored_state_saves_to_the_same_arrays(motor_unit_cell: Cell) -> None:
 def test_restoring_brings_back_sleep_and_drive_mode(motor_unit_cell: Cell) -> None:
     cell = motor_unit_cell
     simulation = Simulation(cell)
-    cell.parts.sleep_all_but(simulation.root, ["plate"])
-    cell.left.use_torque_drive()
+    root, drive = simulation.root, cell.holder.drive
+    cell.parts.sleep_all_but(root, ["plate"])
+    drive.use_torque(root, True)
     state = save_state(simulation)
-    cell.left.use_position_drive()
-    cell.parts.sleep_all_but(simulation.root, ["motor"])
+    drive.use_torque(root, False)
+    cell.parts.sleep_all_but(root, ["motor"])
     restore_state(simulation, state)
-    assert cell.left.in_torque_drive()
-    assert [part.part.name for part in cell.parts if not part.asleep] == ["plate"]
-    cell.left.use_position_drive()
-
-
-def test_noise_continues_where_it_was(make_noisy: Simulation) -> None:
-    state = save_state(make_noisy)
-    expected = [make_noisy.sense("motor").translation() for _ in range(3)]
-    restore_state(make_noisy, state)
-    again = [make_noisy.sense("motor").translation() for _ in range(3)]
-    np.testing.assert_array_equal(again, expected)
-    assert np.ptp(expected, axis=0).min() > 0.0
-
-
-@pytest.fixture
-def make_noisy(motor_unit_cell: Cell) -> Simulation:
-    from dataclasses import replace
-
-    simulation = Simulation(motor_unit_cell)
-    simulation.sensor = replace(simulation.sensor, position_noise=1e-3)
-    return simulation
+    assert drive.uses_torque(root)
+    assert [part.part.name for part in cell.parts if not part.asleep(root)] == ["plate"]

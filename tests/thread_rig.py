@@ -72,7 +72,7 @@ class ThreadRig:
         drive.connect(builder, self.plant, tool)
         self.threads = builder.AddNamedSystem("threads", Threads({BOLT: self.thread}, self.driver))
         self.simulator = Simulator(builder.Build())
-        self.simulator.set_monitor(Monitor(counter, self.threads.reset, [self.threads]))
+        self.simulator.set_monitor(Monitor(counter, self.threads.install, [self.threads]))
         self.root = self.simulator.get_mutable_context()
         self.context = self.plant.GetMyMutableContextFromRoot(self.root)
         X_WBolt = X_AH @ RigidTransform([0.0, 0.0, self.screw.thread_depth])

@@ -125,7 +125,8 @@ class ArmDrive(JointDrive):
         self._mode = self.DeclareDiscreteState([0.0])  # 1 while torques are commanded.
         self._actuators: tuple[JointActuator, ...] = ()
         self._mode_of_model = False  # What the gains in the plant's model are at present.
-        self.DeclarePeriodicDiscreteUpdateEvent(time_step, 0.0, self._set_gains)
+        # Of the same kind as the plant's own update: Drake runs all unrestricted ones first.
+        self.DeclarePeriodicUnrestrictedUpdateEvent(time_step, 0.0, self._set_gains)
 
     def drive(self, actuators: Sequence[JointActuator]) -> None:
         """Take charge of the joints' gains; call before the plant is finalized."""

@@ -38,7 +38,8 @@ class GripperReading:
 class GripperDrive(JointDrive):
     """Drives the jaws to an opening, and presses with a force on what is in between.
 
-    Input ports, optional: ``opening`` [m] of the tip pads, ``force`` [N] per pad.
+    Input ports, optional: ``opening`` [m] of the tip pads, and with it ``force`` [N] per pad; a
+    force alone says nothing.
     """
 
     def __init__(self, model: GripperModel) -> None:

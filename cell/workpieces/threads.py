@@ -85,10 +85,10 @@ class Threads(LeafSystem):
 
     # Simulation.
 
-    def reset(self, root: Context) -> None:
-        """Make every bolt loose, in a new Context: Drake has every constraint active there."""
-        for bolt in self._threads:
-            self.set(root, bolt, Engagement())
+    def install(self, root: Context) -> None:
+        """Bring the ties of a new Context in line with what is remembered: Drake has all closed."""
+        for bolt, engagement in self.engagements(root).items():
+            self._threads[bolt].apply(root, engagement)
 
     def set(self, root: Context, bolt: str, engagement: Engagement) -> None:
         """Put one thread into a state; the positions are left as they are."""
