@@ -1,7 +1,7 @@
 """Save and restore all state of a run: continuing from a restored state is bit-identical.
 
 A saved state is a flat mapping of names to arrays. It also says what it is of: product,
-configuration, bodies and Drake's version; a state of another cell is refused.
+configuration and Drake's version; a state of another cell is refused.
 """
 
 from __future__ import annotations
@@ -98,29 +98,15 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
 
 
 def _identity(cell: Cell) -> dict[str, str]:
-    """Return what a saved state holds for: product, configuration, bodies, Drake's version."""
+    """Return what a saved state holds for: product, configuration, Drake's version."""
     text = json.dumps(cell.config.to_dict(), sort_keys=True, default=str)
     return {
-<<<<<<< HEAD
-        "product": cell.product.name,
-        "configuration": _digest(text),
-        # A caller may have added some.
-        "set of bodies": _digest(*cell.plant.GetStateNames()),
-=======
         "product": f"{cell.product.name} {_digest_of(cell.product)}",
         "configuration": hashlib.sha256(text.encode()).hexdigest()[:16],
->>>>>>> main
         "Drake": version("drake"),
     }
 
 
-<<<<<<< HEAD
-def _digest(*texts: str) -> str:
-    return hashlib.sha256("\n".join(texts).encode()).hexdigest()[:16]
-
-
-def _check_identity(cell: Cell, saved: Mapping[str, Any]) -> None:
-=======
 def _digest_of(product: Product) -> str:
     """Return a digest of what a product's file and meshes say about its parts and joints."""
     digest = hashlib.sha256(repr(product.joints).encode())
@@ -132,7 +118,6 @@ def _digest_of(product: Product) -> str:
 
 
 def _check_identity(cell: Cell, state: Mapping[str, np.ndarray]) -> None:
->>>>>>> main
     for what, now in _identity(cell).items():
         then = str(state.get(f"of/{what}", "unknown"))
         if then != now:
