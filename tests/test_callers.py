@@ -90,5 +90,5 @@ def test_a_state_of_other_bodies_is_refused() -> None:
     """Drake would end the process over the number of positions."""
     with_body = build_cell(CellConfig(), EMPTY, extend=adds(Box(0.03, 0.03, 0.03)))
     without = Simulation(build_cell(CellConfig(), EMPTY))
-    with pytest.raises(InputError, match="another set of bodies"):
+    with pytest.raises(InputError):
         restore_state(without, save_state(Simulation(with_body)))
