@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     from cell.machines.gripper import Gripper
     from cell.machines.grippers import GRIPPER_MODELS
     from cell.machines.grippers.base import Fingertips, GripperModel
+    from cell.monitor import join_monitors
     from cell.products.joints import Fit, Press, Rest, Screw
     from cell.products.loading import load_product
     from cell.products.product import Grasp, Part, Product
@@ -107,6 +108,7 @@ __all__ = [
     "after",
     "build_cell",
     "events",
+    "join_monitors",
     "load_product",
     "motion_finished",
     "read_state",
@@ -157,6 +159,7 @@ _HOME = {
     "add_cell": "cell.builder",
     "after": "cell.simulation.phase",
     "build_cell": "cell.builder",
+    "join_monitors": "cell.monitor",
     "load_product": "cell.products.loading",
     "motion_finished": "cell.simulation.phase",
     "read_state": "cell.simulation.state",

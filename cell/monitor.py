@@ -81,6 +81,17 @@ class StepCounter(LeafSystem):
             )
 
 
+def join_monitors(*monitors: Monitor) -> Callable[[Context], EventStatus]:
+    """Return one monitor for a diagram with several cells."""
+
+    def monitor(root: Context) -> EventStatus:
+        for each in monitors:
+            each(root)
+        return EventStatus.Succeeded()
+
+    return monitor
+
+
 class Monitor:
     """Advances steppers after each step of the plant.
 

@@ -62,7 +62,7 @@ class Product:
 
     Attributes:
         name: For example "motor_unit".
-        parts: By name, in matrix order.
+        parts: By name, in matrix order; a product without parts leaves the cell to other bodies.
         groups: Group name -> names of its parts; a group is one item of an assembly order.
         orders: Assembly orders, each a tuple of part or group names; the first is the default.
         joints: What holds the parts together, in the order of the product file.
@@ -73,8 +73,8 @@ class Product:
         remarks: What was assumed or repaired when it was read, one sentence each.
     """
 
-    name: str
-    parts: Mapping[str, Part]
+    name: str = "nothing"
+    parts: Mapping[str, Part] = field(default_factory=dict)
     groups: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     orders: tuple[tuple[str, ...], ...] = ()
     joints: tuple[Joint, ...] = ()

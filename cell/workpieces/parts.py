@@ -11,7 +11,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import QuaternionFloatingJoint, RigidBody
 from pydrake.systems.framework import Context
 
-from cell.errors import UnknownName
+from cell.errors import BadPart, UnknownName
 from cell.paths import model_url, new_parser
 from cell.products.product import Part, Product
 from cell.sleep import Sleep
@@ -95,6 +95,9 @@ def add_parts(plant: MultibodyPlant, product: Product, X_WT: RigidTransform) -> 
     for part in product.parts.values():
         if part.model is not None and part.X_TrayP is not None:
             (instance,) = new_parser(plant).AddModelsFromUrl(model_url(part.model))
+            taken = plant.GetModelInstanceName(instance) != part.name
+            if taken and plant.HasModelInstanceNamed(part.name):
+                raise BadPart(part.name, "something else in the cell has this name")
             plant.RenameModelInstance(instance, part.name)
             body = plant.get_body(plant.GetBodyIndices(instance)[0])
             joint = plant.AddJoint(

@@ -46,7 +46,7 @@ class Spring(LeafSystem):
 
 
 builder = DiagramBuilder()
-cell = add_cell(builder, CellConfig.load(), Product("nothing", {}))
+cell = add_cell(builder, CellConfig.load(), Product())
 arm, plant = cell.arms["left"], cell.plant
 spring = builder.AddSystem(Spring(arm))
 builder.Connect(plant.get_state_output_port(arm.instance), spring.get_input_port())

@@ -98,7 +98,7 @@ config = CellConfig.load(
         "arms.left.home_pan_deg": 0.0,
     }
 )
-cell = build_cell(config, Product("nothing", {}))
+cell = build_cell(config, Product())
 arm, plant = cell.arms["left"], cell.plant
 simulator = Simulator(cell.diagram)
 simulator.set_monitor(cell.monitor)

@@ -5,7 +5,6 @@ when they pull with 5 N. Once air is back in, they lift the box.
 """
 
 import numpy as np
-import trimesh
 from pydrake.geometry import AddRigidHydroelasticProperties, Box, ProximityProperties
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.tree import SpatialInertia
@@ -39,7 +38,7 @@ class Hand(LeafSystem):
 
 
 builder = DiagramBuilder()
-cell = add_cell(builder, CellConfig.load(), Product("nothing", {}), extend=add_box)
+cell = add_cell(builder, CellConfig.load(), Product(), extend=add_box)
 plant, arm, box = cell.plant, cell.arms["left"], cell.plant.GetBodyByName("box")
 X_WTop = cell.X_WJ @ RigidTransform([0.0, 0.0, cell.fixture.entry_height])
 
@@ -59,7 +58,7 @@ root = simulator.get_mutable_context()
 context = plant.GetMyMutableContextFromRoot(root)
 plant.SetPositions(context, arm.instance, controller.q_up)
 plant.SetFreeBodyPose(context, box, X_WTop @ RigidTransform([0.0, 0.0, 0.045]))
-cell.fixture.receive(root, box, trimesh.creation.box(SIZE))
+cell.fixture.receive(root, box)
 arm.tool.command(root, opening=SIZE[0], force=20.0)
 
 

@@ -7,7 +7,6 @@ harder, until it comes off. Every trial is a new Context of one diagram, so no t
 import csv
 
 import numpy as np
-import trimesh
 from pydrake.common.value import Value
 from pydrake.geometry import AddRigidHydroelasticProperties, Box, ProximityProperties
 from pydrake.math import RigidTransform
@@ -52,7 +51,7 @@ class Trial:
         top = cell.fixture.entry_height + SIZE[2] / 2
         X_WB = cell.X_WJ @ RigidTransform([0.0, 0.0, top])
         cell.plant.SetFreeBodyPose(self.context, self.box, X_WB)
-        cell.fixture.receive(self.root, self.box, trimesh.creation.box(SIZE))
+        cell.fixture.receive(self.root, self.box)
 
     def height(self):
         """Return the height of the box in the world [m]."""
@@ -80,7 +79,7 @@ class Trial:
         return pull - WEIGHT
 
 
-cell = build_cell(CellConfig.load(), Product("nothing", {}), extend=add_box)
+cell = build_cell(CellConfig.load(), Product(), extend=add_box)
 rows = [(vacuum, Trial(cell).holding_force(vacuum)) for vacuum in VACUUMS]
 with open("holding.csv", "w", newline="") as file:
     csv.writer(file).writerows([("vacuum_Pa", "holding_N"), *rows])

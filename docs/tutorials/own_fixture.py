@@ -42,9 +42,7 @@ class MagnetPlate(Fixture):
     name = "magnet_plate"
 
     def __init__(self, plant, scene_graph, base, params, X_BJ=None):
-        super().__init__()
-        self.plant, self.base = plant, base
-        self.X_BJ = RigidTransform() if X_BJ is None else X_BJ
+        super().__init__(plant, base, X_BJ)
         touch = ProximityProperties()
         AddCompliantHydroelasticProperties(0.03, 1e9, touch)
         AddContactMaterial(friction=CoulombFriction(0.3, 0.3), properties=touch)
@@ -52,86 +50,48 @@ class MagnetPlate(Fixture):
         plant.RegisterVisualGeometry(base, X_BPlate, Box(*PLATE), "magnet", np.full(4, 0.5))
         plant.RegisterCollisionGeometry(base, X_BPlate, Box(*PLATE), "magnet", touch)
         self.DeclareDiscreteState([NOBODY, 0.0])  # Index of the body on it; current on.
-        none = Value([ExternallyAppliedSpatialForce()])
-        self.DeclareAbstractOutputPort("applied_forces", none.Clone, self.calc_forces)
-
-    def calc_forces(self, context, output):
-        """Draw body and base towards each other."""
-        index, on = context.get_discrete_state(0).value()
-        forces = []
-        if on and index != NOBODY:
-            body, down = self.plant.get_body(BodyIndex(int(index))), np.array([0, 0, -MAGNET])
-            forces = [force_on(body, np.zeros(3), down), force_on(self.base, np.zeros(3), -down)]
-        output.set_value(forces)
-
-    def remember(self, root, body=None, on=None):
-        """Change what the Context remembers."""
-        context = self.GetMyMutableContextFromRoot(root)
-        index, was_on = context.get_discrete_state(0).value()
-        index = index if body is None else body
-        context.SetDiscreteState(0, [float(index), float(was_on if on is None else on)])
-
-    # The protocol: what operations and planners speak to.
 
     @property
     def entry_height(self):
         return PLATE[2]
 
-    def add_part(self, plant, body, mesh):
-        pass  # The part's own model will do.
-
-    def install(self, root):
-        pass  # The geometry never changes.
-
-    def prepare(self, root):
-        self.remember(root, body=NOBODY, on=False)
-
-    def receive(self, root, body, mesh):
-        self.remember(root, body=int(body.index()))
-
-    def fix(self, root):
-        self.remember(root, on=True)
-
-    def free(self, root):
-        self.remember(root, on=False)
-
-    def release(self, root, body):
-        self.remember(root, body=NOBODY)
-
-    def fixed(self, root):
-        return bool(self.save(root)["state"][1])
-
-    def freed(self, root):
-        return not self.fixed(root)
-
-    def holds(self, root, body):
-        return self.save(root)["state"][0] == int(body.index())
-
-    def reading(self, root):
-        return {"current": self.save(root)["state"][1]}
-
-    def height_at(self, root, p_JQ):
-        return np.where(np.all(np.abs(p_JQ) <= PLATE[:2] / 2, axis=1), PLATE[2], 0.0)
-
-    def pose(self, plant_context):
-        return self.plant.EvalBodyPoseInWorld(plant_context, self.base) @ self.X_BJ
-
     def obstacle(self):
         corners = trimesh.creation.box(PLATE).vertices + [0.0, 0.0, PLATE[2] / 2]
         return Convex(points=corners.T, label="magnet")
 
-    def step(self, root, dt):
-        pass  # Nothing moves in it.
+    def applied_forces(self, context):
+        """Draw body and base towards each other."""
+        index, on = context.get_discrete_state(0).value()
+        if not on or index == NOBODY:
+            return []
+        body, down = self.plant.get_body(BodyIndex(int(index))), np.array([0, 0, -MAGNET])
+        return [force_on(body, np.zeros(3), down), force_on(self.base, np.zeros(3), -down)]
+
+    # What it does when it is told to; everything else is as it is for any fixture.
+
+    def prepare(self, root):
+        self.restore(root, {"state": [NOBODY, 0.0]})
+
+    def receive(self, root, body, mesh=None):
+        self.restore(root, {"state": [int(body.index()), 0.0]})
+
+    def fix(self, root):
+        self.restore(root, {"state": [self.save(root)["state"][0], 1.0]})
+
+    def free(self, root):
+        self.restore(root, {"state": [self.save(root)["state"][0], 0.0]})
+
+    def fixed(self, root):
+        return bool(self.save(root)["state"][1])
 
     def save(self, root):
         return {"state": self.GetMyContextFromRoot(root).get_discrete_state(0).value().copy()}
 
     def restore(self, root, state):
-        index, on = state["state"]
-        self.remember(root, body=index, on=on)
+        self.GetMyMutableContextFromRoot(root).SetDiscreteState(0, state["state"])
 
 
-FIXTURES["magnet_plate"] = f"{__name__}:MagnetPlate"  # The one line: module and class.
+FIXTURES["magnet_plate"] = MagnetPlate  # The one line.
 
 SIZE = np.array([0.03, 0.03, 0.06])  # Of the box that stands on it [m].
 
@@ -156,7 +116,7 @@ def slide(cell, current):
     X_WB = cell.X_WJ @ RigidTransform([0.0, 0.0, cell.fixture.entry_height + SIZE[2] / 2])
     cell.plant.SetFreeBodyPose(context, box, X_WB)
     cell.fixture.prepare(root)
-    cell.fixture.receive(root, box, trimesh.creation.box(SIZE))
+    cell.fixture.receive(root, box)
     if current:
         cell.fixture.fix(root)
     push = force_on(box, [0.0, 0.0, -0.4 * SIZE[2]], [3.0, 0.0, 0.0])
@@ -167,7 +127,7 @@ def slide(cell, current):
 
 
 config = CellConfig.load(overrides={"workcell.fixture": "magnet_plate"})
-cell = build_cell(config, Product("nothing", {}), extend=add_box)
+cell = build_cell(config, Product(), extend=add_box)
 off, on = slide(cell, current=False), slide(cell, current=True)
 print(f"current off: 3 N push the box {1e3 * off:.2f} mm aside")
 print(f"current on:  3 N push the box {1e3 * on:.2f} mm aside")

@@ -37,7 +37,7 @@ class Feel(Enum):
     DESCEND = "descend"
 
 
-cell = build_cell(CellConfig.load(), Product("nothing", {}))
+cell = build_cell(CellConfig.load(), Product())
 arm = cell.arms["left"]
 X_WTop = cell.X_WJ @ RigidTransform([0.0, 0.0, cell.fixture.entry_height])
 

@@ -4,7 +4,6 @@ Each cell has its own plant, configuration and monitor; nothing is shared.
 """
 
 import numpy as np
-import trimesh
 from pydrake.common.value import Value
 from pydrake.geometry import AddRigidHydroelasticProperties, Box, ProximityProperties
 from pydrake.math import RigidTransform
@@ -14,7 +13,7 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
-from cell import CellConfig, Product, add_cell
+from cell import CellConfig, Product, add_cell, join_monitors
 
 SIZE = np.array([0.03, 0.03, 0.06])  # Of the box in each cell [m].
 
@@ -30,18 +29,12 @@ def add_box(plant, scene_graph):
 
 builder = DiagramBuilder()
 cells = {
-    name: add_cell(builder, CellConfig.load(), Product("nothing", {}), name=name, extend=add_box)
+    name: add_cell(builder, CellConfig.load(), Product(), name=name, extend=add_box)
     for name in ("pumped", "soft")
 }
 simulator = Simulator(builder.Build())
 
-
-def monitor(root):
-    """Call the monitor of every cell."""
-    return [cell.monitor(root) for cell in cells.values()][-1]
-
-
-simulator.set_monitor(monitor)
+simulator.set_monitor(join_monitors(*(cell.monitor for cell in cells.values())))
 simulator.Initialize()
 root = simulator.get_mutable_context()
 
@@ -70,7 +63,7 @@ for cell in cells.values():
     box, context = box_of(cell)
     top = cell.fixture.entry_height + SIZE[2] / 2
     cell.plant.SetFreeBodyPose(context, box, cell.X_WJ @ RigidTransform([0.0, 0.0, top]))
-    cell.fixture.receive(root, box, trimesh.creation.box(SIZE))
+    cell.fixture.receive(root, box)
     pull(cell, -20.0)
 simulator.AdvanceTo(0.5)
 for cell in cells.values():
