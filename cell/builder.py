@@ -155,8 +155,8 @@ def add_cell(
             caller's own.
 
     Raises:
-        InputError: A product without simulation models, an unknown device or fixture, a name that
-            another cell in the builder has.
+        InputError: A product without simulation models, an unknown device or fixture, or systems
+            of the builder that have the cell's names already.
     """
     product.check_simulable()
     prefix = f"{name}_" if name else ""
@@ -205,6 +205,7 @@ def add_cell(
         ports.outputs[f"jig.{port.get_name()}"] = port
     ports.inputs["external_forces"] = wiring.forces.GetInputPort("external")
     jig_base = JigBase(config, plant, workcell.base, workcell.plate, wiring.sleeper)
+    _check_names(builder)
 
     def reset(root: Context) -> None:
         threads.install(root)
@@ -226,6 +227,17 @@ def add_cell(
         ports=ports,
         monitor=Monitor(counter, reset, (fixture, threads)),
     )
+
+
+def _check_names(builder: DiagramBuilder) -> None:
+    """Refuse two systems of one name, at which Drake would end the process in `Build`."""
+    names = [system.get_name() for system in builder.GetSystems()]
+    twice = sorted({name for name in names if names.count(name) > 1})
+    if twice:
+        raise InputError(
+            f"The builder has two systems named {', '.join(twice)}: give the cell a name of its "
+            'own, add_cell(..., name="left_cell"), which becomes their prefix.'
+        )
 
 
 def plant_config(config: CellConfig) -> MultibodyPlantConfig:

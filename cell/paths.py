@@ -21,8 +21,11 @@ def new_parser(plant: MultibodyPlant) -> Parser:
 
 
 def model_url(name: str) -> str:
-    """Return the URL of ``models/sdf/<name>/<name>.sdf``."""
-    return f"package://soft_jig_models/sdf/{name}/{name}.sdf"
+    """Return the URL of ``models/sdf/<name>/<name>.sdf``; a URL is returned as it is.
+
+    A model of a user's own lies anywhere: ``file:///home/me/my_arm.sdf``.
+    """
+    return name if "://" in name else f"package://soft_jig_models/sdf/{name}/{name}.sdf"
 
 
 def model_folder(name: str) -> Path:

@@ -64,21 +64,21 @@ class Sleep(LeafSystem):
         self._bearers = tuple(bearers)
         joints = map(plant.get_joint, plant.GetJointIndices())
         self._joints = {int(joint.child_body().index()): joint for joint in joints}
-        self._index = self.DeclareAbstractState(Value[object](SleepMemory()))
+        self._index = self.DeclareAbstractParameter(Value[object](SleepMemory()))
         self.DeclareAbstractOutputPort(
-            "loads", no_forces, self._calc_loads, {self.all_state_ticket()}
+            "loads", no_forces, self._calc_loads, {self.all_parameters_ticket()}
         )
 
     def memory(self, root: Context) -> SleepMemory:
         """Return what is remembered in a Context of the diagram; not to be changed."""
-        return self.GetMyContextFromRoot(root).get_abstract_state(self._index).get_value()
+        return self.GetMyContextFromRoot(root).get_abstract_parameter(self._index).get_value()
 
     def _changed(self, root: Context) -> SleepMemory:
         context = self.GetMyMutableContextFromRoot(root)
-        return context.get_mutable_abstract_state(self._index).get_mutable_value()
+        return context.get_mutable_abstract_parameter(self._index).get_mutable_value()
 
     def _calc_loads(self, context: Context, output: AbstractValue) -> None:
-        memory: SleepMemory = context.get_abstract_state(self._index).get_value()
+        memory: SleepMemory = context.get_abstract_parameter(self._index).get_value()
         output.set_value([force for forces in memory.loads.values() for force in forces])
 
     def put_to_sleep(

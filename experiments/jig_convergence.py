@@ -1,13 +1,13 @@
-"""Convergence of what the frozen bed holds: `python -m experiments.jig_convergence [--out DIR]`.
+"""Convergence of the holding force: `python -m experiments.jig_convergence [--out DIR]`.
 
-The holding force of a standing cylinder, a lying cylinder and the plate on its foot against the
-mesh of the frozen bed, the cell of the soft one, the time step and Drake's contact approximation,
-one at a time from the defaults. Vented, 90 kPa: elastic contact and yield alone. Prints a table
-with the change over the last refinement and writes it as `convergence.csv`.
+The holding force of a standing cylinder, a lying cylinder and the plate on its foot, over the mesh
+size of the frozen bed, the cell of the soft bed, the time step and the contact approximation, one
+at a time from the defaults. Vented at 90 kPa: elastic contact and yield alone. Prints a table with
+the change over the last refinement and writes it as `convergence.csv`.
 
-The approximation in use is "lagged": what it holds does not depend on how fast the part is dragged.
+The approximation in use is "lagged": its holding force is independent of the speed of the drag.
 With "sap" (regularised friction, dissipation as a relaxation time) the force grows with speed, and
-comes down towards that of "lagged" as the speed goes to zero: both are measured at two speeds.
+tends to that of "lagged" as the speed goes to zero: both are measured at two speeds.
 """
 
 from __future__ import annotations
@@ -37,8 +37,17 @@ SPEED, SLOW = 0.020, 0.005  # Of the drag [m/s].
 
 
 @dataclass(frozen=True)
-class Setting:
-    """One variation: what is varied, to what, and the rig's numbers."""
+class Variation:
+    """One variation from the defaults.
+
+    Attributes:
+        varied: Name of the varied quantity.
+        value: Its value, as text.
+        params: Of the jig.
+        time_step: [s].
+        approximation: Discrete contact approximation of Drake.
+        speed: Of the drag [m/s].
+    """
 
     varied: str
     value: str
@@ -48,25 +57,25 @@ class Setting:
     speed: float = SPEED
 
 
-def settings() -> Iterator[Setting]:
-    """Yield the variations, coarse to fine; the default is in every sequence."""
+def variations() -> Iterator[Variation]:
+    """Yield the variations, coarse to fine; the default is part of every sequence."""
     params = parameters()
     for size in MESH_SIZES:
         jammed = replace(params.jammed, mesh_size=size)
-        yield Setting("mesh size", f"{size * 1e3:g} mm", replace(params, jammed=jammed))
+        yield Variation("mesh size", f"{size * 1e3:g} mm", replace(params, jammed=jammed))
     for cell in CELLS:
         bag = replace(params.bag, cell=cell)
-        yield Setting("bed cell", f"{cell * 1e3:g} mm", replace(params, bag=bag))
+        yield Variation("bed cell", f"{cell * 1e3:g} mm", replace(params, bag=bag))
     for step in STEPS:
-        yield Setting("time step", f"{step * 1e3:g} ms", params, time_step=step)
+        yield Variation("time step", f"{step * 1e3:g} ms", params, time_step=step)
     for name in APPROXIMATIONS:
-        yield Setting("approximation", name, params, approximation=name)
+        yield Variation("approximation", name, params, approximation=name)
     for name in APPROXIMATIONS:
-        yield Setting("dragged slowly", name, params, approximation=name, speed=SLOW)
+        yield Variation("dragged slowly", name, params, approximation=name, speed=SLOW)
 
 
 def specimens() -> dict[str, Specimen]:
-    """Return what is held."""
+    """Return the specimens by name."""
     plate = load_product("motor_unit").parts["plate"]
     return {
         "standing": Prism(),
@@ -75,40 +84,43 @@ def specimens() -> dict[str, Specimen]:
     }
 
 
-def holding_force(specimen: Specimen, setting: Setting, depth: float = DEPTH) -> float:
-    """Return what a part holds against a push near its top, across its least stable side [N]."""
+def holding_force(specimen: Specimen, variation: Variation, depth: float = DEPTH) -> float:
+    """Return the resistance [N] to a push near the top of a part, across its least stable side."""
     rig = ElementRig(
-        setting.params, specimen, time_step=setting.time_step, approximation=setting.approximation
+        variation.params,
+        specimen,
+        time_step=variation.time_step,
+        approximation=variation.approximation,
     )
     rig.lower_to(depth, speed=0.04)
     rig.jam()
     rig.let_go(0.2)
     top = rig.X_JP.inverse() @ np.array([0.0, 0.0, rig.params.bag.cap_height + lever(specimen)])
-    # A lying cylinder along x is pushed across, the plate out of its plane.
+    # A cylinder lying along x is pushed across its axis, the plate out of its plane.
     direction = SIDEWAYS if isinstance(specimen, Prism) and not specimen.lying else across(rig)
-    return rig.drag(top, direction, speed=setting.speed).holding_force
+    return rig.drag(top, direction, speed=variation.speed).holding_force
 
 
 def lever(specimen: Specimen) -> float:
-    """Return how far over the apex the push acts [m]: 40 mm where the part is that tall."""
+    """Return the height of the push over the apex [m]: `PUSH_HEIGHT` if the part is that tall."""
     height = np.ptp(specimen.mesh().vertices @ specimen.X_CP.rotation().matrix()[2])
     return float(min(PUSH_HEIGHT, height - DEPTH - 0.005))
 
 
 def across(rig: ElementRig) -> np.ndarray:
-    """Return the horizontal axis of J in which the part is thinnest."""
+    """Return the horizontal axis (3,) of J along which the part is thinnest."""
     corners = rig.part.mesh().vertices @ rig.X_JP.rotation().matrix().T
     return np.eye(3)[int(np.argmin(np.ptp(corners, axis=0)[:2]))]
 
 
 def last_refinement(rows: Sequence[Sequence[Any]]) -> dict[str, list[float]]:
-    """Return what each varied number changes by from its last but one value to its last.
+    """Return the relative change of each force over the last refinement of each quantity.
 
     Args:
-        rows: Name of what is varied, its value, and one force per specimen [N].
+        rows: Name of the varied quantity, its value, and one force per specimen [N].
 
     Returns:
-        Relative changes, one per specimen; approximations have no finer end.
+        Relative changes by quantity, one per specimen, without the approximations.
     """
     changes = {}
     refined = [row[0] for row in rows if row[1] not in APPROXIMATIONS]
@@ -123,11 +135,11 @@ def main(out: Path = Path("out/convergence")) -> None:
     out.mkdir(parents=True, exist_ok=True)
     parts = specimens()
     rows: list[list[str | float]] = []
-    for setting in settings():
-        forces = [holding_force(part, setting) for part in parts.values()]
-        rows.append([setting.varied, setting.value, *forces])
+    for variation in variations():
+        forces = [holding_force(part, variation) for part in parts.values()]
+        rows.append([variation.varied, variation.value, *forces])
         values = "".join(f"{force:9.2f} N" for force in forces)
-        print(f"{setting.varied:14s} {setting.value:8s}{values}", flush=True)
+        print(f"{variation.varied:14s} {variation.value:8s}{values}", flush=True)
     for varied, changes in last_refinement(rows).items():
         print(f"{varied:14s} {'last':8s}" + "".join(f"{change:+9.1%}  " for change in changes))
     with (out / "convergence.csv").open("w", newline="", encoding="utf-8") as file:

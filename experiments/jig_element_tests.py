@@ -1,11 +1,11 @@
 """Element tests of the soft jig against formulas and discrete-element runs.
 
 `python -m experiments.jig_element_tests [--out DIR]` presses a flat punch into the soft and into
-the frozen bed, and drags and pulls a standing cylinder out of the frozen one, over depth and
-vacuum, vented and sealed. It prints a table with the reasons of what differs by more than 30 %, and
-writes `element_tests.png`, `.csv` and `.txt`. One parameter set: the defaults. Only what the
-reference defines otherwise is set: part friction, no suction ("vented") or a seal that holds full
-vacuum over all of the flat end and a little beyond, whatever it opens ("sealed").
+the frozen bed, and pushes and pulls a standing cylinder out of the frozen bed, over depth and
+vacuum, vented and sealed. It prints a table with reasons for the differences beyond 30 %, and
+writes `element_tests.png`, `.csv` and `.txt`. All parameters are the defaults, except what the
+reference defines otherwise: part friction, and no suction ("vented") or full vacuum over all of the
+flat end and slightly beyond, however far it opens ("sealed").
 """
 
 from __future__ import annotations
@@ -38,14 +38,21 @@ from experiments.jig.element_tests import (
 )
 
 DEPTHS = (0.005, 0.010, 0.015)
-# The lowest stands for an open valve: beads held by membrane and weight alone.
+# The lowest is an open valve: beads confined by membrane and weight alone.
 VACUUMS = (1.0, 30e3, 60e3, 90e3)
 WEIGHT = CYLINDER.mass * 9.81
 
 
 @dataclass(frozen=True)
 class Row:
-    """One comparison: ours, the formula's and the reference's lowest and highest value."""
+    """One comparison.
+
+    Attributes:
+        name: Of the quantity, with its unit.
+        ours: Its value here.
+        formula: Its value by the formula.
+        reference: Its lowest and highest value in the reference.
+    """
 
     name: str
     ours: float
@@ -55,7 +62,7 @@ class Row:
 
 @dataclass
 class Results:
-    """Table, drags by name, and punch curves by name."""
+    """All comparisons, drags by name, and punch curves by name (n, 2) [m, Pa]."""
 
     rows: list[Row]
     drags: dict[str, Drag]
@@ -65,17 +72,22 @@ class Results:
 def compare() -> Results:
     """Run every test."""
     results = Results([], {}, {})
-    _soft(results)
-    _frozen(results)
+    _punch_soft_bed(results)
+    _punch_frozen_bed(results)
     for sealed in (False, True):
         for vacuum in VACUUMS:
             depths = DEPTHS if vacuum == FULL_VACUUM else (0.010,)
             for depth in depths:
-                _hold(results, depth, vacuum, sealed)
+                kind = "sealed" if sealed else "vented"
+                case = f"{kind}, {depth * 1e3:.0f} mm, {vacuum / 1e3:.0f} kPa"
+                results.drags[f"push, {case}"] = push(depth, vacuum, sealed)
+                results.drags[f"pull, {case}"] = pull(depth, vacuum, sealed)
+                _compare_push(results, case, depth, vacuum, sealed)
+                _compare_pull(results, case, depth, vacuum, sealed)
     return results
 
 
-def _soft(results: Results) -> None:
+def _punch_soft_bed(results: Results) -> None:
     dome = reference()["dome_punch"]
     kinds = {
         "with membrane": {},
@@ -95,7 +107,7 @@ def _soft(results: Results) -> None:
     results.rows.append(Row("imprint left of 15 mm [-]", kept, reference=(1 - back, 1 - back)))
 
 
-def _frozen(results: Results) -> None:
+def _punch_frozen_bed(results: Results) -> None:
     bearing = Strength.of(JigParameters().soil, FULL_VACUUM).bearing * END
     drag = frozen_punch()
     results.rows.append(Row("frozen punch, largest load; c Nc A [N]", drag.force.max(), bearing))
@@ -103,27 +115,14 @@ def _frozen(results: Results) -> None:
     results.rows.append(Row("frozen punch, sunk by then [mm]", sunk))
 
 
-def _hold(results: Results, depth: float, vacuum: float, sealed: bool) -> None:
-    case = f"{_kind(sealed)}, {depth * 1e3:.0f} mm, {vacuum / 1e3:.0f} kPa"
-    results.drags[f"push, {case}"] = push(depth, vacuum, sealed)
-    results.drags[f"pull, {case}"] = pull(depth, vacuum, sealed)
-    full = vacuum == FULL_VACUUM
-    _compare_push(results, case, depth, lateral_formula(depth, vacuum, sealed), full, sealed)
-    sucked = reference()["sealed_area_ratio"] * vacuum * END if sealed else 0.0
-    _compare_pull(results, case, WEIGHT + sucked, full and depth == DEPTHS[-1], sealed)
-
-
-def _kind(sealed: bool) -> str:
-    return "sealed" if sealed else "vented"
-
-
-def _compare_push(
-    results: Results, case: str, depth: float, formula: float, known: bool, sealed: bool
-) -> None:
+def _compare_push(results: Results, case: str, depth: float, vacuum: float, sealed: bool) -> None:
+    """Compare the force of a push, and its moment less that of the weight."""
     force, lever = results.drags[f"push, {case}"].holding_force, PUSH_HEIGHT + depth
+    formula = lateral_formula(depth, vacuum, sealed)
     forces = np.array([np.nan])
-    if known:
-        forces = np.array(reference()[f"{_kind(sealed)}_lateral"]["force_N"][DEPTHS.index(depth)])
+    if vacuum == FULL_VACUUM:
+        known = reference()["sealed_lateral" if sealed else "vented_lateral"]
+        forces = np.array(known["force_N"][DEPTHS.index(depth)])
     span = (float(forces.min()), float(forces.max()))
     results.rows.append(Row(f"push, {case} [N]", force, formula, span))
     own, low, high = (f * lever - WEIGHT * CYLINDER.radius for f in (force, *span))
@@ -131,19 +130,21 @@ def _compare_push(
     results.rows.append(Row(name, own, formula * lever - WEIGHT * CYLINDER.radius, (low, high)))
 
 
-def _compare_pull(results: Results, case: str, carried: float, known: bool, sealed: bool) -> None:
-    """Compare a pull, and what is left of it without weight and suction: friction on the sides."""
-    force, data = results.drags[f"pull, {case}"].holding_force, reference()["pull_out"]
-    whole, sides = (data[f"{_kind(sealed)}_N"], data[f"{_kind(sealed)}_sides_N"])
-    if not known:
+def _compare_pull(results: Results, case: str, depth: float, vacuum: float, sealed: bool) -> None:
+    """Compare the force of a pull, and its share beyond weight and suction: side friction."""
+    force, known = results.drags[f"pull, {case}"].holding_force, reference()["pull_out"]
+    kind = "sealed" if sealed else "vented"
+    whole, sides = known[f"{kind}_N"], known[f"{kind}_sides_N"]
+    if vacuum != FULL_VACUUM or depth != DEPTHS[-1]:
         whole = sides = float("nan")
+    suction = reference()["sealed_area_ratio"] * vacuum * END if sealed else 0.0
     results.rows.append(Row(f"pull, {case} [N]", force, reference=(whole, whole)))
     name = f"pull, {case}: friction on the sides [N]"
-    results.rows.append(Row(name, force - carried, reference=(sides, sides)))
+    results.rows.append(Row(name, force - (WEIGHT + suction), reference=(sides, sides)))
 
 
 def plot(results: Results) -> Figure:
-    """Draw the punch curves and the pushes beside the reference."""
+    """Plot the punch curves and the pushes with the reference."""
     data, figure = reference(), Figure(figsize=(12, 8), layout="constrained")
     axes = figure.subplots(2, 2)
     for name, curve in results.punches.items():
@@ -172,26 +173,28 @@ def plot(results: Results) -> Figure:
 REASONS = """Differences beyond 30 %:
 - Soft punch: the reference has no membrane; ours stretches and stiffens with depth. Without it the
   curves agree within 30 %.
-- Vented pushes: forces of 1 to 4 N, which scatter up to six times between the reference's packings.
-  Ours grow with the imprint's wall (passive wedge). In the reference's dome the ground beside the
-  cylinder sinks with it and leaves 4 to 7 mm of wall at 10 to 15 mm of depth, for which the formula
-  gives 1.3 and 2.7 N; `jig.soil.shoulder_share` 0.85 lets it sink here; pushes with
-  it have not been measured.
-- Vented pull: the reference's 2 N (the weight) is of its rigid cup, whose dent opens on evacuation;
-  in a dome it closes by 0.05 mm in diameter, as here, and friction on that is the difference.
+- Vented pushes: forces of 1 to 4 N, which scatter by a factor of up to six between the packings of
+  the reference. Ours grow with the wall of the imprint (passive wedge). In the reference dome the
+  ground beside the cylinder sinks with it and leaves 4 to 7 mm of wall at 10 to 15 mm of depth, for
+  which the formula gives 1.3 and 2.7 N; `jig.soil.shoulder_share` 0.85 lets it sink here; pushes
+  with it have not been measured.
+- Vented pull: the 2 N of the reference (the weight) are those of its rigid cup, whose imprint opens
+  on evacuation; in a dome it closes by 0.05 mm in diameter, as here, and the friction due to that
+  is the difference.
 - Sealed pushes: the reference fails at 2 to 3 mm, ours still rises at 6: the frozen bed is softer
-  (E50 10 MPa). With the reference's 33 MPa, an upper bound, it holds 30 and 32 N at 5 and 10 mm.
-- Frozen punch: it gives way at half of c Nc A, 2 to 3 mm deep, also with beads that never yield:
-  the mesh's pressure falls off towards the edges of a column once the part is half a mesh size in.
-  A press is 20 N.
+  (E50 10 MPa). With the 33 MPa of the reference, an upper bound, it resists 30 and 32 N at 5 and
+  10 mm.
+- Frozen punch: it fails at half of c Nc A, 2 to 3 mm deep, also with beads that never yield: the
+  pressure of the mesh falls off towards the edges of a column once the part has sunk by half the
+  mesh size. A press is 20 N.
 - Sealed pull: the reference has 41 N of friction on sides that are sealed as well (0.28 of the
   vacuum as shear); suction here acts on flat faces only.
-- At 0 kPa the weight alone turns back 0.034 N m: compare the moments less the weight's own.
+- At 0 kPa the weight alone resists with 0.034 N m: compare the moments less that of the weight.
 """
 
 
 def main(out: Path = Path("out/element_tests")) -> None:
-    """Run the element tests, print the table and write it with the plot into a folder."""
+    """Run the element tests, print the table and write it with the plot."""
     out.mkdir(parents=True, exist_ok=True)
     results = compare()
     with (out / "element_tests.csv").open("w", newline="", encoding="utf-8") as file:

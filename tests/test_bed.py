@@ -1,4 +1,4 @@
-"""The plastic bed: what it weighs, keeps, conserves and gives back."""
+"""The plastic bed: volume balance, imprint, bearing capacity and friction."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def new_bed(**soil: float) -> Bed:
 def sink(
     bed: Bed, samples: SurfaceSamples, depth: float, speed: float = 0.01, step: float = STEP
 ) -> NDArray[np.float64]:
-    """Push straight down to a depth below the apex; return depth and force per step (n, 2)."""
+    """Press straight down to a depth [m] below the apex; return depth [m] and force [N] (n, 2)."""
     start = bed.bag.cap_height
     curve = []
     for k in range(1, round(depth / (speed * step)) + 1):
@@ -51,26 +51,26 @@ def press_at(bed, samples, position, velocity, step=STEP):
 
 
 def test_bare_bag_has_the_volume_of_its_cap() -> None:
-    """296 cm3 [S]; the steep border costs the grid half a percent."""
+    """296 cm3 [S]; the grid misses half a percent at the steep border."""
     bed = new_bed()
     assert bed.bag.volume == pytest.approx(296e-6, rel=0.005)
     assert bed.volume == pytest.approx(bed.bag.volume, rel=0.01)
 
 
 def test_samples_have_the_projected_area_of_the_surface(punch: SurfaceSamples) -> None:
-    """A flat end shows pi r2 to the bed, whatever the binning."""
+    """A flat end has the projected area pi r2, whatever the binning."""
     area = punch.underside(UPRIGHT, 0.0015).areas.sum()
     assert area == pytest.approx(np.pi * PUNCH_RADIUS**2, rel=0.01)
 
 
 def balance(bed: Bed) -> float:
-    """Return what is missing from the bare cap's volume when all that is booked counts [m3]."""
+    """Return the error of the volume balance: bare cap plus booked changes less bed [m3]."""
     booked = bed.ledger.dilated - bed.ledger.absorbed - bed.contracted
     return float(new_bed().volume) + booked - bed.volume
 
 
 def test_pressing_conserves_volume(punch: SurfaceSamples) -> None:
-    """What sinks under the punch rises as a collar with what the beads dilate, to rounding."""
+    """The volume under the punch rises as a collar, with the dilation of the beads, to rounding."""
     bed = new_bed()
     sink(bed, punch, 0.012)
     assert balance(bed) == pytest.approx(0.0, abs=1e-12)
@@ -89,7 +89,7 @@ def test_volume_balance_closes_from_inflation_to_release(punch: SurfaceSamples) 
         elif stage == "jam":
             bed.jam(0.004)
             assert bed.contracted > 0.5e-6
-        elif stage == "push":  # The part pushes the frozen bed aside.
+        elif stage == "push":  # The part displaces the frozen bed.
             bed.conform((UPRIGHT, np.array([0, 0, 0.033])), punch)
         elif stage == "release":
             bed.unjam()
@@ -99,10 +99,10 @@ def test_volume_balance_closes_from_inflation_to_release(punch: SurfaceSamples) 
     assert max(worst) < 1e-12
 
 
-def test_beads_lie_looser_where_they_were_sheared_and_tighter_under_vacuum(
+def test_packing_fraction_falls_by_shear_and_rises_under_vacuum(
     punch: SurfaceSamples,
 ) -> None:
-    """Packing fraction 0.61 on the bare cap; 1 to 2 % less volume of beads after 10 mm."""
+    """0.61 in the bare cap; 1 to 2 % less after 10 mm."""
     bed = new_bed()
     rest = bed.packing_fraction
     assert rest == pytest.approx(0.608, abs=0.004)
@@ -113,11 +113,11 @@ def test_beads_lie_looser_where_they_were_sheared_and_tighter_under_vacuum(
     assert bed.packing_fraction > pressed
 
 
-def test_collar_against_the_discrete_elements(punch: SurfaceSamples) -> None:
-    """Raised over displaced volume, height over displaced volume, and place, within 30 %.
+def test_collar_agrees_with_the_discrete_elements(punch: SurfaceSamples) -> None:
+    """Raised volume and height of the collar per displaced volume, and its place, within 30 %.
 
-    The reference is a rigid cup of 50 mm: a flat bed, whose punch displaces more at equal depth
-    than on our dome. So heights are compared per displaced volume.
+    The reference is a rigid cup of 50 mm: on its flat bed a punch displaces more at equal depth
+    than on our dome, so heights are compared per displaced volume.
     """
     heights_mm, swept_cm3 = (1.94, 3.30, 4.34), (4.81, 9.62, 14.4)
     for depth, height, swept, ratio in zip(
@@ -146,7 +146,7 @@ def test_shoulder_sinks_beside_the_part_as_in_a_free_dome(punch: SurfaceSamples)
 
 
 def test_packing_slack_is_the_most_that_can_vanish(punch: SurfaceSamples) -> None:
-    """With slack the collar starts later, and no more than the slack is lost."""
+    """With slack the collar starts later, and exactly the slack is absorbed."""
     slack = 2e-6
     bed = new_bed(packing_slack=slack, dilation_limit=0.0)
     before = bed.volume
@@ -157,7 +157,7 @@ def test_packing_slack_is_the_most_that_can_vanish(punch: SurfaceSamples) -> Non
 def test_imprint_stays_when_the_part_is_lifted_and_a_second_part_adds_its_own(
     punch: SurfaceSamples,
 ) -> None:
-    """80 % of the indentation and more remain; then another part presses beside the first."""
+    """More than 80 % of the indentation remains; a second part is then pressed in beside it."""
     bed = new_bed()
     sink(bed, punch, 0.010)
     for k in range(200):
@@ -170,17 +170,17 @@ def test_imprint_stays_when_the_part_is_lifted_and_a_second_part_adds_its_own(
     for k in range(400):
         press_at(bed, second, [0.030, 0, 0.045 - k * 4e-5], [0, 0, -0.04])
     assert bed.height_at(np.array([[0.030, 0.0]]))[0] == pytest.approx(0.029, abs=1e-3)
-    # Its collar fills the first imprint by little.
+    # Its collar hardly fills the first imprint.
     assert bed.height_at(np.zeros((1, 2)))[0] == pytest.approx(floor, abs=1.5e-3)
     bed.inflate()
     assert bed.heights == pytest.approx(new_bed().heights, abs=1e-12)
 
 
-def test_punch_pressure_against_the_references(punch: SurfaceSamples) -> None:
-    """Stretch hardening carries 20 N; beads alone match the order of the DEM dome.
+def test_punch_pressure_agrees_with_the_references(punch: SurfaceSamples) -> None:
+    """Stretch hardening carries 20 N; the DEM dome is a lower bound.
 
-    A quasi-static prototype gives 5 / 10 / 20 N at 1.6 / 3.1 / 7.6 mm. Its collar stands at the
-    rim, ours 16 mm from it, where it stretches the membrane less: up to 65 % deeper. DEM has no
+    A quasi-static prototype gives 5 / 10 / 20 N at 1.6 / 3.1 / 7.6 mm. Its collar is at the rim,
+    ours 16 mm from it, where it stretches the membrane less: up to 65 % deeper. DEM has no
     membrane: 8 kPa at 3 mm is a lower bound.
     """
     depth, force = sink(new_bed(), punch, 0.014).T
@@ -192,14 +192,14 @@ def test_punch_pressure_against_the_references(punch: SurfaceSamples) -> None:
 
 
 def test_without_stretch_hardening_the_punch_runs_away(punch: SurfaceSamples) -> None:
-    """A slack membrane that cannot stretch stiff carries far less at depth."""
+    """A membrane without stiffness carries far less at depth."""
     stiff = sink(new_bed(), punch, 0.012)[-1, 1]
     slack = sink(new_bed(membrane_modulus=0.0), punch, 0.012)[-1, 1]
     assert slack < 0.6 * stiff
 
 
 def test_unloading_leaves_the_imprint(punch: SurfaceSamples) -> None:
-    """Only the elastic part comes back: below 1 mm of 10 mm."""
+    """Only the elastic part springs back: below 1 mm of 10 mm."""
     bed = new_bed()
     sink(bed, punch, 0.010)
     floor = bed.heights[tuple(np.array(bed.heights.shape) // 2)]
@@ -211,7 +211,7 @@ def test_unloading_leaves_the_imprint(punch: SurfaceSamples) -> None:
 
 
 def test_half_the_step_gives_the_same_force(punch: SurfaceSamples) -> None:
-    """The law is nearly rate independent, and its integration converged at 1 ms."""
+    """The law is nearly rate independent, and its integration has converged at 1 ms."""
     coarse = sink(new_bed(), punch, 0.010)[-1, 1]
     fine = sink(new_bed(), punch, 0.010, step=STEP / 2)[-1, 1]
     slow = sink(new_bed(), punch, 0.010, speed=0.005)[-1, 1]
@@ -219,8 +219,8 @@ def test_half_the_step_gives_the_same_force(punch: SurfaceSamples) -> None:
     assert slow == pytest.approx(coarse, rel=0.05)
 
 
-def test_centered_punch_feels_no_moment_and_an_offset_one_does(punch: SurfaceSamples) -> None:
-    """On the slope of the dome the bed pushes on the uphill side."""
+def test_only_an_eccentric_punch_is_loaded_by_a_moment(punch: SurfaceSamples) -> None:
+    """On the slope of the dome the bed presses on the uphill side."""
     bed = new_bed()
     _, torque = press_at(bed, punch, [0, 0, 0.0439], [0, 0, 0])
     assert np.abs(torque).max() < 1e-3
@@ -229,8 +229,8 @@ def test_centered_punch_feels_no_moment_and_an_offset_one_does(punch: SurfaceSam
     assert torque[1] > 0.2 * force[2] * 0.01
 
 
-def test_friction_resists_up_to_coulombs_limit(punch: SurfaceSamples) -> None:
-    """A dragged punch is held by mu N, against the motion."""
+def test_friction_of_a_dragged_punch_is_coulombs(punch: SurfaceSamples) -> None:
+    """It is mu N, against the motion."""
     bed = new_bed()
     sink(bed, punch, 0.003)
     z = bed.bag.cap_height - 0.003
@@ -240,8 +240,8 @@ def test_friction_resists_up_to_coulombs_limit(punch: SurfaceSamples) -> None:
     assert abs(force[1]) < 0.05 * force[2]
 
 
-def test_vacuum_makes_the_bed_hold_what_crushed_it_before(punch: SurfaceSamples) -> None:
-    """Bearing strength follows the confining pressure: 85 kPa carries 100 times the load."""
+def test_bearing_capacity_follows_the_confining_pressure() -> None:
+    """85 kPa of vacuum carry 100 times the load."""
     bed = new_bed()
     bed.vacuum = 85e3
     for _ in range(20):
@@ -249,7 +249,7 @@ def test_vacuum_makes_the_bed_hold_what_crushed_it_before(punch: SurfaceSamples)
     assert bed.yield_pressure[bed.active].min() > 0.7e6
 
 
-def test_jam_shrinks_the_free_surface_only_and_unjam_undoes_it(punch: SurfaceSamples) -> None:
+def test_jam_shrinks_only_the_free_surface_and_unjam_reverses_it(punch: SurfaceSamples) -> None:
     """The imprint stays at the held part; the rest sinks by the contraction and comes back."""
     bed = new_bed()
     sink(bed, punch, 0.008)
@@ -264,7 +264,7 @@ def test_jam_shrinks_the_free_surface_only_and_unjam_undoes_it(punch: SurfaceSam
 
 
 def test_restored_bed_continues_bit_for_bit(punch: SurfaceSamples) -> None:
-    """Also into another bed object."""
+    """In another bed object, too."""
     bed, other = new_bed(), new_bed()
     sink(bed, punch, 0.00537)
     saved = bed.state()
@@ -280,7 +280,7 @@ def test_restored_bed_continues_bit_for_bit(punch: SurfaceSamples) -> None:
 
 
 def dragged(bed: Bed, samples: SurfaceSamples, second: SurfaceSamples | None) -> float:
-    """Return the friction on a part that is dragged by 0.2 mm while a second one lies still [N]."""
+    """Return the friction on a part dragged by 0.2 mm while a second one lies still [N]."""
     sink(bed, samples, 0.003)
     for k in range(1, 21):
         pull = press_at(bed, samples, [k * 1e-5, 0, bed.bag.cap_height - 0.003], [0.01, 0, 0])
@@ -289,8 +289,8 @@ def dragged(bed: Bed, samples: SurfaceSamples, second: SurfaceSamples | None) ->
     return -float(pull[0][0])
 
 
-def test_second_part_leaves_the_first_ones_friction_alone() -> None:
-    """A still block elsewhere on the bed changes nothing under the one that is dragged."""
+def test_second_part_does_not_change_the_friction_of_the_first() -> None:
+    """A block at rest elsewhere on the bed, while the first one is dragged."""
     mesh = trimesh.creation.cylinder(radius=0.006, height=0.03, sections=32)
     mesh.apply_translation([0, 0, 0.015])
     first, second = SurfaceSamples.of("first", mesh), SurfaceSamples.of("second", mesh)
@@ -299,8 +299,8 @@ def test_second_part_leaves_the_first_ones_friction_alone() -> None:
     assert together == pytest.approx(alone, rel=0.05)
 
 
-def test_part_on_the_place_of_a_forgotten_one_starts_without_its_friction() -> None:
-    """A block that comes straight down where another was dragged away feels no sideways force."""
+def test_part_at_the_place_of_a_released_one_starts_without_friction() -> None:
+    """A block that comes straight down where another was dragged has no lateral force on it."""
     mesh = trimesh.creation.cylinder(radius=0.006, height=0.03, sections=32)
     mesh.apply_translation([0, 0, 0.015])
     bed, second = new_bed(), SurfaceSamples.of("second", mesh)
@@ -311,8 +311,8 @@ def test_part_on_the_place_of_a_forgotten_one_starts_without_its_friction() -> N
     assert force[:2] == pytest.approx([0.0, 0.0], abs=1e-12)
 
 
-def test_bed_that_was_pushed_aside_does_not_come_back_under_the_part(punch: SurfaceSamples) -> None:
-    """What had shrunk at the place rises beside the part; the balance is kept."""
+def test_shrinkage_does_not_come_back_under_a_part_that_moved(punch: SurfaceSamples) -> None:
+    """It rises beside the part; the volume balance holds."""
     bed = new_bed()
     sink(bed, punch, 0.008)
     bed.jam(0.004)
@@ -325,7 +325,7 @@ def test_bed_that_was_pushed_aside_does_not_come_back_under_the_part(punch: Surf
 
 
 @pytest.mark.parametrize("share", [0.0, 0.85])
-def test_bed_restored_before_its_first_collar_continues_alike(
+def test_bed_restored_before_its_first_collar_continues_bit_for_bit(
     punch: SurfaceSamples, share: float
 ) -> None:
     bed, other = new_bed(shoulder_share=share), new_bed(shoulder_share=share)
@@ -338,8 +338,8 @@ def test_bed_restored_before_its_first_collar_continues_alike(
 
 
 @pytest.mark.parametrize("aside", [0.0, 0.7e-3, 1.1e-3])
-def test_height_beside_does_not_look_into_the_imprint(aside: float) -> None:
-    """Beside a bar and over it: the bed's own height, wherever the bar is on the grid."""
+def test_height_beside_a_part_is_free_of_its_imprint(aside: float) -> None:
+    """Beside a bar and over it: the height of the free bed, wherever the bar is on the grid."""
     bar = trimesh.creation.box((0.040, 0.005, 0.030))
     bar.apply_translation([0, 0, 0.015])
     samples = SurfaceSamples.of("bar", bar)

@@ -1,4 +1,4 @@
-"""The drawn parts have the measured dimensions, and the contact pieces the fits they claim."""
+"""The drawn parts have the measured dimensions, and the contact pieces the declared fits."""
 
 import filecmp
 from collections.abc import Callable
@@ -45,7 +45,7 @@ def test_parts_are_closed_solids(model: Model) -> None:
             assert piece.shape.is_volume or not piece.convex  # A rigid surface may be open.
 
 
-def test_motor_agrees_with_the_measured_one() -> None:
+def test_motor_has_the_measured_dimensions_and_inertia() -> None:
     model = mu.motor_model()
     low, high = whole(model).bounds * 1e3
     assert high[2] - low[2] == pytest.approx(81.7, abs=1e-6)  # Tip to tip.
@@ -59,7 +59,7 @@ def test_motor_agrees_with_the_measured_one() -> None:
     assert transverse == pytest.approx(6.2e-5, rel=0.1)
 
 
-def test_plate_agrees_with_the_measured_one() -> None:
+def test_plate_has_the_measured_volume_and_centre() -> None:
     plate = whole(mu.plate_model())
     # Measured 25 228 with a sharp bore of 12.00; this one is 12.10 with two edge breaks.
     assert plate.volume / MM3 == pytest.approx(25_228, rel=1e-3)
@@ -68,7 +68,7 @@ def test_plate_agrees_with_the_measured_one() -> None:
     assert mu.plate_model().inertia.mass == pytest.approx(0.068, rel=5e-3)
 
 
-def test_bolt_agrees_with_the_measured_one() -> None:
+def test_bolt_has_the_measured_volume_and_mass() -> None:
     bolt = mu.bolt_model()
     assert whole(bolt).volume / MM3 == pytest.approx(130.5, rel=5e-3)
     assert bolt.inertia.mass == pytest.approx(1.02e-3, rel=5e-3)
@@ -81,7 +81,7 @@ def test_assembled_parts_do_not_overlap() -> None:
         assert (one ^ other).volume() < 1e-6  # mm3; touching faces are exactly coincident.
 
 
-def test_idler_overlaps_in_its_threads_only() -> None:
+def test_idler_overlaps_only_in_its_threads() -> None:
     """Each bolt shares a thin tube with its tap-drilled hole: nominal against drilled diameter."""
     post, arm = idler.post_solid(), idler.arm_solid()
     assert (post ^ arm).volume() < 1e-6  # mm3
@@ -93,7 +93,7 @@ def test_idler_overlaps_in_its_threads_only() -> None:
 
 
 def test_shank_and_threaded_hole_coincide() -> None:
-    """The corners of the drawn thread are the corners of the motor's hole: they touch all round."""
+    """The corners of the drawn thread are those of the motor's hole: contact all around."""
     parts = load_product("motor_unit").parts
     p_ABolt = parts["bolt_2"].X_AP.translation()
     shank = parts["bolt_2"].mesh.vertices
@@ -132,7 +132,7 @@ def test_can_has_16_flats_and_corners_between_the_axes() -> None:
     assert np.linalg.norm(can[:, :2], axis=1).max() == pytest.approx(vertex_radius(0.0174, 16))
 
 
-def test_plate_boxes_leave_the_gearbox_alone() -> None:
+def test_plate_boxes_clear_the_gearbox() -> None:
     for piece in mu.plate_model().pieces:
         if piece.name.startswith("bed_edge"):
             half = np.asarray(piece.shape.size())[:2] / 2  # type: ignore[union-attr]
@@ -141,7 +141,7 @@ def test_plate_boxes_leave_the_gearbox_alone() -> None:
 
 
 def test_head_friction_reproduces_the_nut_factor() -> None:
-    """Integrate friction over the very facets that the head bears on: torque per newton is K d."""
+    """Friction integrated over the facets under the head: the torque per newton is K d."""
     washer = surfaces(mu.plate_model())["washer_0"]
     on_top = washer.triangles_center[:, 2] > 4.99e-3
     top = trimesh.Trimesh(washer.vertices, washer.faces[on_top])
@@ -159,7 +159,7 @@ def test_friction_radius_of_many_facets_is_that_of_a_round_ring() -> None:
     assert mu.friction_radius(3.0, 0.0, 1000) == pytest.approx(2.0, rel=1e-5)
 
 
-def test_shank_meets_the_wall_of_its_hole_before_any_edge_of_the_faces() -> None:
+def test_shank_touches_the_wall_of_its_hole_before_any_edge_of_the_faces() -> None:
     washer = surfaces(mu.plate_model())["washer_0"]
     xy = washer.vertices[:, :2] - np.array(mu.bolt_xy()[0]) * 1e-3
     radius, on_wall = np.linalg.norm(xy, axis=1), washer.vertices[:, 2] % 5e-3 > 1e-6

@@ -1,4 +1,4 @@
-"""The frozen bed's mesh: valid, conforming to the part, and complete."""
+"""The mesh of the frozen bed: valid, conforming to the part, and complete."""
 
 from __future__ import annotations
 
@@ -11,17 +11,23 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
-from cell.fixtures.soft_jig.mesh.columns import TetMesh
 from cell.fixtures.soft_jig.mesh.contact_mesh import bed_mesh, imprint_mesh
-from cell.fixtures.soft_jig.mesh.plane_cells import conforming_cells, outline
-from cell.fixtures.soft_jig.mesh.polygons import area, clip, lower_facets, subtract
+from cell.fixtures.soft_jig.mesh.polygons import (
+    area,
+    clip,
+    conforming_cells,
+    lower_facets,
+    outline,
+    subtract,
+)
 from cell.fixtures.soft_jig.mesh.rings import FOOT_GAP
+from cell.fixtures.soft_jig.mesh.tet_mesh import BadMesh, TetMesh
 from cell.fixtures.soft_jig.parameters import JigParameters
 from cell.fixtures.soft_jig.soft.bed import Bed
 from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 
 PARAMS = JigParameters()
-# How far the rim of a wall reaches into the part.
+# Depth to which the rim of a wall overlaps the part [m].
 RIM_SQUEEZE = 2 * abs(PARAMS.jammed.squeeze) + FOOT_GAP
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
@@ -41,7 +47,7 @@ PLATE = [
     box([-0.035, -0.033, 0], [0.035, 0.027, 0.005]),
     box([-0.035, -0.033, -0.015], [0.035, -0.028, 0]),
 ]
-# Foot and face side by side, as in the model: leaning, their undersides part or overlap.
+# Foot and face as neighbours, as in the model: if they lean, their undersides part or overlap.
 PLATE_PIECES = [
     box([-0.035, -0.028, 0], [0.035, 0.027, 0.005]),
     box([-0.035, -0.033, -0.015], [0.035, -0.028, 0.005]),
@@ -61,7 +67,7 @@ POSTURES = {
 
 
 def pressed(hulls: list[NDArray[np.float64]], euler_deg: Sequence[float], force: float = 20.0):
-    """Press convex hulls into a bed quasi-statically, freeze it, return bed and hulls in J."""
+    """Press convex hulls into a bed quasi-statically and freeze it; return bed and hulls in J."""
     R_JP = Rotation.from_euler("xyz", euler_deg, degrees=True).as_matrix()
     mesh = trimesh.util.concatenate([trimesh.convex.convex_hull(h) for h in hulls])
     assert isinstance(mesh, trimesh.Trimesh)
@@ -81,7 +87,7 @@ def pressed(hulls: list[NDArray[np.float64]], euler_deg: Sequence[float], force:
 
 
 def overlap(mesh: TetMesh, hulls: list[NDArray[np.float64]]) -> float:
-    """Return how far points of the mesh's surface lie inside the part at most [m]."""
+    """Return the largest depth of points on the mesh's surface inside the part [m]."""
     corners = mesh.vertices[mesh.boundary()]
     weights = np.random.default_rng(0).dirichlet([1, 1, 1], 100)
     points = np.einsum("kj,tjc->tkc", weights, corners).reshape(-1, 3)
@@ -100,7 +106,7 @@ def imprint(request):
 
 
 def test_imprint_has_positive_tetrahedra_and_a_closed_surface(imprint) -> None:
-    """Every edge of the surface belongs to two triangles, and it encloses the mesh's volume."""
+    """Every edge of the surface belongs to two triangles, and the surface encloses the volume."""
     _, _, mesh = imprint
     surface = trimesh.Trimesh(mesh.vertices, mesh.boundary(), process=False)
     assert mesh.volumes().min() > 0
@@ -108,25 +114,25 @@ def test_imprint_has_positive_tetrahedra_and_a_closed_surface(imprint) -> None:
     assert surface.volume == pytest.approx(mesh.volumes().sum(), rel=1e-9)
 
 
-def test_imprint_leaves_room_for_the_part(imprint) -> None:
-    """Nothing reaches into the part but the squeeze at the rim, and 0.25 mm at the foot's end."""
+def test_imprint_overlaps_the_part_by_no_more_than_the_squeeze(imprint) -> None:
+    """Only the rim of the wall does, and 0.25 mm at the end of the plate's foot."""
     _, hulls, mesh = imprint
     assert overlap(mesh, hulls) < RIM_SQUEEZE + 0.25e-3
 
 
-def test_imprint_is_as_large_as_the_bed(imprint) -> None:
-    """The mesh leaves out the steep border of the cap and chords of the dome: 20 % at most."""
+def test_imprint_has_the_volume_of_the_bed(imprint) -> None:
+    """The mesh omits the steep border of the cap and cuts the dome by chords: 20 % at most."""
     bed, _, mesh = imprint
     assert 0.8 * bed.volume < mesh.volumes().sum() < bed.volume
 
 
-def test_imprint_is_small_enough_to_simulate(imprint) -> None:
+def test_imprint_has_few_enough_tetrahedra_to_simulate(imprint) -> None:
     _, _, mesh = imprint
     assert len(mesh.tetrahedra) < 1600
 
 
 def test_floor_shares_the_facets_of_a_standing_part() -> None:
-    """The floor of a standing prism is its own bottom polygon with the gap at its foot."""
+    """The floor under a standing prism is its bottom polygon, offset by the gap at the foot."""
     bed, hulls = pressed(MOTOR, [0, 0, 0])
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
     bottom = hulls[0][:, 2].min()
@@ -136,7 +142,7 @@ def test_floor_shares_the_facets_of_a_standing_part() -> None:
 
 
 def test_wall_closes_on_the_part_by_the_squeeze() -> None:
-    """Half way up, between the gap at its foot and the rim, the wall is squeezed by its mean."""
+    """The mean offset of the wall, between the gap at its foot and its rim, is the squeeze."""
     bed, hulls = pressed(MOTOR, [0, 0, 0])
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
     inner = np.hypot(*mesh.vertices[:, :2].T) < 0.0178
@@ -150,7 +156,7 @@ def test_wall_closes_on_the_part_by_the_squeeze() -> None:
 
 
 def test_wall_of_a_leaning_part_leans_with_it() -> None:
-    """At 1 deg the walls stay parallel to the part: no more overlap than the squeeze at the rim."""
+    """At 1 deg the walls stay parallel to the part: no overlap beyond the squeeze at the rim."""
     bed, hulls = pressed(MOTOR, [1, 0, 0], 10.0)
     lean = np.array([0.0, -np.tan(np.radians(1))])
     assert overlap(imprint_mesh(bed, PARAMS.jammed, hulls, lean), hulls) < RIM_SQUEEZE + 0.03e-3
@@ -172,29 +178,28 @@ def test_plate_in_pieces_around_a_hole_gives_one_floor() -> None:
 
 
 @pytest.mark.parametrize("force", [0.05, 0.3, 1.0])
-def test_light_touch_of_a_round_part_is_meshed(force: float) -> None:
-    """A lying can that covers no facet by half leaves no imprint; the bed is its own surface."""
+def test_round_part_that_touches_lightly_is_meshed(force: float) -> None:
+    """A lying can that covers no facet by half leaves no imprint: the mesh is the bed's surface."""
     bed, hulls = pressed(MOTOR, [90, 0, 0], force)
     assert imprint_mesh(bed, PARAMS.jammed, hulls).volumes().min() > 0
 
 
-def test_untouched_bed_gives_the_dome() -> None:
-    """A part above the bag leaves no imprint."""
+def test_part_above_the_bag_leaves_no_imprint() -> None:
     bed = Bed(PARAMS.bag, PARAMS.soil)
     above = [hull + [0, 0, 0.2] for hull in MOTOR]
     mesh, dome = imprint_mesh(bed, PARAMS.jammed, above), bed_mesh(bed, PARAMS.jammed)
     assert np.array_equal(mesh.vertices, dome.vertices)
 
 
-def test_vtk_text_holds_every_point_and_cell() -> None:
+def test_vtk_text_lists_every_vertex_and_tetrahedron() -> None:
     mesh = bed_mesh(Bed(PARAMS.bag, PARAMS.soil), PARAMS.jammed)
     lines = mesh.vtk().splitlines()
     assert lines[4] == f"POINTS {len(mesh.vertices)} double"
     assert lines.count("10") == len(mesh.tetrahedra)
 
 
-def test_largest_depth_of_a_known_tetrahedral_cube() -> None:
-    """A cube of edge 2 with one vertex in its middle: 1 deep."""
+def test_largest_depth_of_a_cube_is_half_its_edge() -> None:
+    """Edge 2, with a single interior vertex at the centre."""
     corners = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], dtype=float)
     hull = trimesh.convex.convex_hull(corners)
     apex = np.zeros((1, 3))
@@ -204,8 +209,8 @@ def test_largest_depth_of_a_known_tetrahedral_cube() -> None:
     assert mesh.volumes().sum() == pytest.approx(8.0)
 
 
-def test_polygons_clip_and_subtract_conserve_area() -> None:
-    """A part inside plus the pieces outside make the whole."""
+def test_clipping_and_subtracting_conserve_area() -> None:
+    """The intersection and the pieces outside add up to the polygon."""
     hole = SQUARE * 0.5 + 0.3
     inside = area(clip(SQUARE, hole))
     outside = sum(area(piece) for piece in subtract(SQUARE, hole))
@@ -213,16 +218,25 @@ def test_polygons_clip_and_subtract_conserve_area() -> None:
     assert inside + outside == pytest.approx(1.0)
 
 
-def test_lower_facets_of_a_box_are_its_bottom() -> None:
+def test_lower_facet_of_a_box_is_its_bottom() -> None:
     (facet,) = lower_facets(box([0, 0, 0.1], [1, 2, 3]))
     assert area(facet.polygon) == pytest.approx(2.0)
     assert facet.height(np.array([[0.5, 0.5]])) == pytest.approx(0.1)
 
 
-def test_neighbouring_cells_share_their_hanging_vertices() -> None:
+def test_cells_take_over_the_hanging_vertices_of_their_neighbours() -> None:
     """Two small squares beside a large one: the large one gets the vertex between them."""
     big = SQUARE * 2
     cells = [big, SQUARE + [2, 0], SQUARE + [2, 1]]
     _, welded = conforming_cells(cells, longest=10.0)
     assert len(welded[0]) == 5
     assert len(outline(welded)) == 7
+
+
+def test_cells_around_a_hole_are_refused() -> None:
+    """The jig meshes a single outline; four bars around a square have two."""
+    low, high = SQUARE * [3, 1], SQUARE * [3, 1] + [0, 2]
+    left, right = SQUARE + [0, 1], SQUARE + [2, 1]
+    _, welded = conforming_cells([low, high, left, right], longest=10.0)
+    with pytest.raises(BadMesh, match="hole"):
+        outline(welded)

@@ -1,4 +1,4 @@
-"""The element tests' script: reference data, formulas, and one short run of each kind."""
+"""The script of the element tests: reference data, formulas, and one short run of each kind."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_reference_has_a_force_for_every_depth() -> None:
 
 
 def test_formula_is_the_statics_of_the_standing_cylinder() -> None:
-    """132 kPa on 35 x 10 mm and the weight overturn at 5.3 N; the seal adds p A b over it."""
+    """132 kPa on 35 x 10 mm and the weight resist; a seal adds p A b over the lever arm."""
     vented = lateral_formula(0.010, 90e3, sealed=False)
     assert vented == pytest.approx((132e3 * 0.035 * 0.010 * 0.005 + 1.96 * 0.0175) / 0.05, rel=0.01)
     sealed = lateral_formula(0.010, 90e3, sealed=True) - vented
@@ -33,7 +33,7 @@ def test_formula_is_the_statics_of_the_standing_cylinder() -> None:
 
 
 def test_soft_bed_is_stiffer_than_beads_without_a_membrane() -> None:
-    """The reference has no membrane: a lower bound, and within a factor of four."""
+    """The reference has no membrane: a lower bound, to within a factor of four."""
     curve, _ = punch(0.010, step=2e-3)
     dome = reference()["dome_punch"]
     for depth, pressure in zip(dome["depth_mm"][2:8], dome["pressure_kPa"][2:8], strict=True):
@@ -41,8 +41,8 @@ def test_soft_bed_is_stiffer_than_beads_without_a_membrane() -> None:
         assert 0.9 * pressure < ours < 4 * pressure
 
 
-def test_without_membrane_the_bed_bears_as_the_beads_do() -> None:
-    """Within 30 % of the reference's mean from 3 to 10 mm, whose points scatter; imprints stay."""
+def test_bed_without_membrane_bears_like_the_reference() -> None:
+    """Within 30 % of the mean of its scattered points from 3 to 10 mm; the imprint stays."""
     curve, bed = punch(0.010, step=2e-3, membrane=False)
     dome = reference()["dome_punch"]
     ours = [np.interp(depth / 1e3, *curve.T) / 1e3 for depth in dome["depth_mm"][2:8]]
@@ -50,8 +50,8 @@ def test_without_membrane_the_bed_bears_as_the_beads_do() -> None:
     assert residual(bed, 0.010) > 0.9
 
 
-def test_frozen_bed_bears_far_more_than_a_press() -> None:
-    """Ten times 20 N and more, within a millimetre; the formula's 837 N are not reached."""
+def test_frozen_bed_bears_more_than_ten_presses() -> None:
+    """Ten times 20 N within a millimetre; the 837 N of the formula are not reached."""
     drag = frozen_punch()
     assert np.interp(1e-3, drag.way[:300], drag.force[:300]) > 200.0
     assert drag.force.max() < 837.0
@@ -59,7 +59,7 @@ def test_frozen_bed_bears_far_more_than_a_press() -> None:
 
 @pytest.fixture(scope="module")
 def pulls() -> dict[bool, float]:
-    """Return the largest upward pull that a shallow vented and a sealed cylinder resist [N]."""
+    """Return the resistance of a shallow cylinder to an upward pull, vented and sealed [N]."""
     forces = {}
     for sealed in (False, True):
         rig = held(0.005, 90e3, sealed)
@@ -68,12 +68,12 @@ def pulls() -> dict[bool, float]:
     return forces
 
 
-def test_seal_decides_the_pull_out(pulls: dict[bool, float]) -> None:
-    """Vented little more than the weight of 2 N; sealed about the suction, 102 N, more."""
+def test_seal_adds_the_suction_to_the_pull_out_force(pulls: dict[bool, float]) -> None:
+    """Vented it is little more than the weight of 2 N; sealed about 102 N more."""
     assert pulls[False] < 8.0
     assert pulls[True] - pulls[False] == pytest.approx(90e3 * 11.3e-4, rel=0.3)
 
 
-def test_row_without_reference_says_so() -> None:
+def test_missing_reference_is_not_a_number() -> None:
     assert np.isnan(Row("x", 1.0).formula)
     assert np.isnan(Row("x", 1.0).reference).all()

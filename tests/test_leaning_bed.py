@@ -1,4 +1,4 @@
-"""The frozen bed under parts that lean a little: random small tilts and offsets."""
+"""The frozen bed under parts that lean slightly, in random directions."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from test_contact_mesh import MOTOR, PARAMS, RIM_SQUEEZE, box, overlap, pressed
 
 from cell.fixtures.soft_jig.mesh import contact_mesh
 from cell.fixtures.soft_jig.mesh.contact_mesh import imprint_mesh
-from cell.fixtures.soft_jig.mesh.leaning_bed import LeaningBed
+from cell.fixtures.soft_jig.mesh.contact_region import ShearedBed
 from cell.fixtures.soft_jig.soft.bed import Bed
 
-# The model's own pieces around the plate's hole, and its foot.
+# The pieces of the model around the plate's hole, and its foot.
 PLATE = [
     box([-0.035, -0.028, 0], [-0.02, 0.027, 0.005]),
     box([0.02, -0.028, 0], [0.035, 0.027, 0.005]),
@@ -33,7 +33,7 @@ TILTS_DEG = (0.3, 2.0, 8.0)
 
 
 def leaning(posture: str, tilt_deg: float, seed: int):
-    """Press a part in a random direction of tilt; return bed, hulls in J and lean."""
+    """Press a part tilted in a random direction; return bed, hulls in J and lean (2,)."""
     hulls, up = POSTURES[posture]
     rng = np.random.default_rng(seed)
     upright = Rotation.align_vectors([[0, 0, 1]], [up])[0]
@@ -48,10 +48,10 @@ def leaning(posture: str, tilt_deg: float, seed: int):
 @pytest.mark.parametrize("tilt_deg", TILTS_DEG)
 @pytest.mark.parametrize("posture", POSTURES)
 def test_bed_of_a_leaning_part_is_valid(posture: str, tilt_deg: float) -> None:
-    """Positive tetrahedra, a closed surface, room for the part, and most of the bed.
+    """Positive tetrahedra, a closed surface, little overlap with the part, and most of the bed.
 
-    The rings run straight from wall to rim: beside a long, thin contact they cut off the dome's
-    bulge, a quarter of the bed under a plate on its side.
+    The rings are straight from the wall to the aperture: beside a long, narrow contact they cut off
+    the bulge of the dome, a quarter of the bed under a plate on its side.
     """
     bed, hulls, lean = leaning(posture, tilt_deg, seed=int(10 * tilt_deg))
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls, lean)
@@ -62,8 +62,8 @@ def test_bed_of_a_leaning_part_is_valid(posture: str, tilt_deg: float) -> None:
     assert overlap(mesh, hulls) < RIM_SQUEEZE + 0.6e-3
 
 
-def test_standing_motor_is_meshed_where_it_stands(monkeypatch: pytest.MonkeyPatch) -> None:
-    """On one flat body nothing is sheared: not a bit differs from the mesh without shear."""
+def test_part_on_one_flat_body_is_meshed_without_shear(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The standing motor: bit for bit the mesh that results with shear switched off."""
     bed, hulls = pressed(MOTOR, [1.0, 0.5, 20])
     lean = np.array([0.009, -0.017])
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls, lean)
@@ -73,8 +73,8 @@ def test_standing_motor_is_meshed_where_it_stands(monkeypatch: pytest.MonkeyPatc
     assert np.array_equal(mesh.tetrahedra, unsheared.tetrahedra)
 
 
-def test_larger_of_two_patches_is_the_floor() -> None:
-    """Two separate blocks: the mesh is that of the larger one's floor."""
+def test_floor_is_the_larger_of_two_patches() -> None:
+    """Of two separate blocks only the larger one leaves an imprint."""
     large = box([-0.02, -0.01, 0], [0.005, 0.01, 0.03])
     small = box([0.01, -0.005, 0], [0.02, 0.005, 0.03])
     bed, hulls = pressed([large, small + [0, 0, 2e-4]], [0, 0, 0])
@@ -89,12 +89,12 @@ def test_larger_of_two_patches_is_the_floor() -> None:
 
 
 def test_sheared_bed_is_the_same_surface() -> None:
-    """Its points lie on its own height field, and shearing back gives the bed."""
+    """Its points lie on its own height field, and shearing them back gives the bed."""
     bed = Bed(PARAMS.bag, PARAMS.soil)
-    view = LeaningBed(bed, np.array([0.1, -0.05]), 0.03)
+    view = ShearedBed(bed, np.array([0.1, -0.05]), 0.03)
     surface = view.surface()
     inner = np.hypot(*surface[:, :2].T) < 0.8 * PARAMS.bag.aperture_radius
     error = view.height_at(surface[inner, :2]) - surface[inner, 2]
     assert np.abs(error).max() < 5e-5
-    xy = view.leaning(surface)[:, :2]
+    xy = view.from_sheared(surface)[:, :2]
     assert xy == pytest.approx(np.stack([bed.x[bed.active], bed.y[bed.active]], axis=1))

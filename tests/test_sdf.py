@@ -1,4 +1,4 @@
-"""Text written by cell.cad.sdf is read back by Drake with the same physics."""
+"""SDF text of a part is read back by Drake with the same physics."""
 
 from pathlib import Path
 
@@ -12,7 +12,7 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Diagram, DiagramBuilder
 
-from cell.cad.sdf import LINK, Contact, Look, Model, Piece, mesh_inertia, sdf_text, write_model
+from cell.cad.sdf import LINK, Contact, Model, Piece, Visual, mesh_inertia, sdf_text, write_model
 from cell.errors import BadPart
 from cell.paths import model_url, new_parser
 from cell.products.loading import load_product
@@ -38,8 +38,8 @@ def test_impossible_mass_is_refused(mass: float) -> None:
 def test_drake_reads_back_pose_mass_and_contact() -> None:
     X = RigidTransform(RollPitchYaw(0.1, -0.2, 0.3), [1e-3, -2e-3, 3e-3])
     piece = Piece("bed_side", Box(0.1, 0.2, 0.3), Contact(0.4, 1e8, 0.003, 7.0), X)
-    look = Look("look", Box(0.1, 0.2, 0.3), (1, 0, 0), X)
-    model = Model("thing", mesh_inertia(brick(), 2.0), [piece], [look])
+    visual = Visual("look", Box(0.1, 0.2, 0.3), (1, 0, 0), X)
+    model = Model("thing", mesh_inertia(brick(), 2.0), [piece], [visual])
     plant, scene_graph = MultibodyPlant(1e-3), SceneGraph()
     plant.RegisterAsSourceForSceneGraph(scene_graph)
     Parser(plant).AddModelsFromString(sdf_text(model), "sdf")
@@ -59,14 +59,16 @@ def test_drake_reads_back_pose_mass_and_contact() -> None:
 
 def test_meshes_lie_where_the_sdf_points(tmp_path: Path) -> None:
     piece = Piece("hull", brick(), Contact(0.5), convex=True)
-    model = Model("thing", mesh_inertia(brick(), 1.0), [piece], [Look("skin", brick(), (1, 1, 1))])
+    model = Model(
+        "thing", mesh_inertia(brick(), 1.0), [piece], [Visual("skin", brick(), (1, 1, 1))]
+    )
     text = write_model(tmp_path, model).read_text()
     for file in ("hull_contact.obj", "skin_visual.obj"):
         assert f"sdf/thing/{file}" in text
         assert (tmp_path / "thing" / file).is_file()
 
 
-def test_bolt_inertia_survives_the_text() -> None:
+def test_bolt_inertia_keeps_its_precision_in_the_text() -> None:
     """1e-9 kg m2 printed with too few digits is not positive definite."""
     parts = load_product("motor_unit").parts
     plant = MultibodyPlant(1e-3)
@@ -120,13 +122,13 @@ def assembled() -> Assembled:
     return Assembled()
 
 
-def test_boss_passes_the_bore_and_a_misplaced_one_meets_it(assembled: Assembled) -> None:
-    """Rigid on rigid would fall back to convex hulls and plug the hole."""
+def test_boss_clears_the_bore_and_a_misplaced_one_touches_it(assembled: Assembled) -> None:
+    """Rigid on rigid would fall back to convex hulls, which close the hole."""
     assert assembled.contacts(motor=[0, 0, -2e-3], plate=[0, 0, 0]) == set()
     assert assembled.contacts(motor=[2e-4, 0, -2e-3], plate=[0, 0, 0]) == {("bore", "boss")}
 
 
-def test_seated_face_is_carried_by_the_washers_alone(assembled: Assembled) -> None:
+def test_seated_face_is_supported_by_the_washers_alone(assembled: Assembled) -> None:
     pairs = assembled.contacts(motor=[0, 0, 1e-5], plate=[0, 0, 0])
     assert {second for _, second in pairs} == {f"washer_{k}" for k in range(6)}
 

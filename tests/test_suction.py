@@ -1,4 +1,4 @@
-"""Suction: which cells seal, and how the seal pulls, opens and breaks."""
+"""Suction: which cells seal, and how the seal pulls, opens and fails."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ DISC = np.hypot(X, Y) < 0.0175
 PARAMS = SuctionParameters()
 
 
-def test_flat_disc_seals_but_for_its_lip() -> None:
+def test_flat_disc_seals_except_for_its_lip() -> None:
     """Sealed area pi (r - lip)^2 over pi r^2."""
     sealed, (patch,) = sealed_cells(np.zeros((N, N)), DISC, CELL, LIP)
     assert patch.seal == pytest.approx((1 - LIP / 0.0175) ** 2, rel=0.1)
@@ -30,15 +30,15 @@ def test_tilted_face_seals_like_a_level_one() -> None:
     assert np.array_equal(level, tilted)
 
 
-def test_hole_vents_a_lip_around_it() -> None:
-    """A 12 mm hole costs the seal a disc of 6 mm and the lip."""
+def test_hole_vents_one_lip_width_around_it() -> None:
+    """A hole of radius 6 mm vents itself and the lip."""
     hole = np.hypot(X, Y) < 0.006
     sealed, _ = sealed_cells(np.zeros((N, N)), DISC & ~hole, CELL, LIP)
     assert not sealed[np.hypot(X, Y) < 0.006 + LIP - CELL].any()
     assert sealed.any()
 
 
-def test_pins_of_the_motor_vent_its_end() -> None:
+def test_terminals_of_the_motor_vent_its_end_face() -> None:
     """Two 6.3 mm terminals and a 3 mm boss leave less than a fifth of the face sealed."""
     heights = np.zeros((N, N))
     heights[np.hypot(X, Y) < 0.0039] = -0.003
@@ -66,19 +66,19 @@ def test_closed_seal_pulls_with_strength_times_area() -> None:
 
 
 @pytest.mark.parametrize("where", [(0.0, PARAMS.reach), (1.01 * PARAMS.slip, 0.0)])
-def test_seal_is_lost_at_its_reach_and_does_not_heal(where: tuple[float, float]) -> None:
-    """Opened or slid so far it does not pull, nor after coming back."""
+def test_seal_fails_at_its_reach_and_does_not_heal(where: tuple[float, float]) -> None:
+    """Opened or slid this far it no longer pulls, not even after it has closed again."""
     opened = seal()
     assert not opened.pull(at(*where), 4e3, PARAMS)[0].any()
     assert not opened.pull(at(0, 0), 4e3, PARAMS)[0].any()
 
 
-def test_half_opened_seal_pulls_half() -> None:
+def test_half_opened_seal_pulls_half_as_much() -> None:
     whole = seal().pull(at(0, 0), 4e3, PARAMS)[0][2]
     assert seal().pull(at(0, PARAMS.reach / 2), 4e3, PARAMS)[0][2] == pytest.approx(whole / 2)
 
 
-def test_saved_seal_pulls_the_same() -> None:
+def test_restored_seal_pulls_bit_for_bit_the_same() -> None:
     first = seal()
     first.pull(at(0, 3e-4), 4e3, PARAMS)
     again = Seal.from_arrays(first.arrays())
@@ -87,6 +87,6 @@ def test_saved_seal_pulls_the_same() -> None:
     )
 
 
-def test_suction_follows_the_vacuum_and_its_switch() -> None:
+def test_suction_is_proportional_to_the_vacuum_and_can_be_switched_off() -> None:
     assert PARAMS.pressure(45e3) == pytest.approx(PARAMS.strength / 2)
     assert SuctionParameters(enabled=False).pressure(90e3) == 0.0

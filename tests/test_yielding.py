@@ -1,4 +1,4 @@
-"""The frozen bed's strength: formulas, relief of excess pressure, and the plastic return."""
+"""Strength of the frozen bed: formulas, relief of excess pressure, and the plastic return."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from cell.fixtures.soft_jig import JigParameters
-from cell.fixtures.soft_jig.frozen.yielding import Patch, Strength, returned
-from cell.fixtures.soft_jig.mesh.columns import TetMesh
+from cell.fixtures.soft_jig.frozen.yielding import Patch, Strength, plastic_return
+from cell.fixtures.soft_jig.mesh.tet_mesh import TetMesh
 from cell.fixtures.soft_jig.parameters import SoilParameters
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import Prism
@@ -31,7 +31,7 @@ def block() -> TetMesh:
 
 
 def patch_on_top(depth: float, excess: float, gradient: float = 2.5e8) -> Patch:
-    """Return polygons that lie this deep behind the block's top, over its limit by a pressure."""
+    """Return polygons at a depth [m] behind the top of the block, with an excess pressure [Pa]."""
     side = np.linspace(-0.009, 0.009, 10)
     x, y = (grid.ravel() for grid in np.meshgrid(side, side))
     n = len(x)
@@ -47,8 +47,8 @@ def patch_on_top(depth: float, excess: float, gradient: float = 2.5e8) -> Patch:
     )
 
 
-def test_strength_is_the_formulas_of_soil_mechanics() -> None:
-    """90 kPa and 25 deg: 132 kPa against a wall, c Nc = 0.87 MPa under a floor [D]."""
+def test_strength_follows_the_formulas_of_soil_mechanics() -> None:
+    """90 kPa and 25 deg: 132 kPa on a wall, c Nc = 0.87 MPa on a floor [D]."""
     strength = Strength.of(SoilParameters(), 90e3)
     assert strength.lateral == pytest.approx(132e3, rel=0.005)
     assert strength.bearing == pytest.approx(0.87e6, rel=0.005)
@@ -57,22 +57,22 @@ def test_strength_is_the_formulas_of_soil_mechanics() -> None:
     assert wall_and_floor == pytest.approx([strength.lateral, strength.bearing])
 
 
-def test_relief_is_the_excess_times_the_area_into_the_bed() -> None:
+def test_relief_is_the_excess_pressure_times_the_area_into_the_bed() -> None:
     force, torque = patch_on_top(1e-3, 2e4).relief(np.array([0.0, 0.0, 0.02]))
     assert force == pytest.approx([0, 0, -2e4 * 100 * 4e-6])
     assert torque == pytest.approx(np.zeros(3), abs=1e-9)
 
 
-def test_within_the_limit_nothing_is_relieved() -> None:
+def test_nothing_is_relieved_below_the_limit() -> None:
     force, _ = patch_on_top(1e-3, -1.0).relief(np.zeros(3))
     assert not force.any()
-    assert returned(block(), [patch_on_top(1e-3, -1.0)], 1e-5) is None
+    assert plastic_return(block(), [patch_on_top(1e-3, -1.0)], 1e-5) is None
 
 
-def test_surface_returns_by_the_excess_depth() -> None:
+def test_surface_moves_by_the_excess_depth() -> None:
     """A uniform excess of 50 kPa at 250 kPa/mm lowers the face by 0.2 mm, and only that face."""
     mesh = block()
-    moved = returned(mesh, [patch_on_top(1e-3, 5e4)], 1e-5)
+    moved = plastic_return(mesh, [patch_on_top(1e-3, 5e4)], 1e-5)
     assert moved is not None
     shift = moved.vertices - mesh.vertices
     top = mesh.vertices[:, 2] > 0.015
@@ -81,15 +81,15 @@ def test_surface_returns_by_the_excess_depth() -> None:
     assert moved.volumes().min() > 0
 
 
-def test_mesh_that_would_fold_over_is_moved_less_or_not_at_all() -> None:
-    """Asked to sink by more than its height, the block keeps positive tetrahedra."""
-    moved = returned(block(), [patch_on_top(1e-3, 5e6)], 1e-5)
+def test_plastic_return_never_folds_the_mesh_over() -> None:
+    """An excess depth beyond the height of the block leaves its tetrahedra positive."""
+    moved = plastic_return(block(), [patch_on_top(1e-3, 5e6)], 1e-5)
     assert moved is None or moved.volumes().min() > 0
 
 
 @pytest.fixture(scope="module")
 def weak_wall() -> tuple[float, float]:
-    """Return what holds a cylinder 15 mm deep, low on its side: at full strength and at a tenth."""
+    """Return the lateral capacity of a cylinder 15 mm deep: at full strength and at a tenth [N]."""
     forces = []
     for strength in (1.0, 0.1):
         params = JigParameters()
@@ -102,7 +102,9 @@ def weak_wall() -> tuple[float, float]:
     return forces[0], forces[1]
 
 
-def test_walls_hold_no_more_than_their_strength(weak_wall: tuple[float, float]) -> None:
-    """In the plant: walls of a tenth of the strength hold far less, and not nothing."""
+def test_lateral_capacity_falls_with_the_strength_of_the_walls(
+    weak_wall: tuple[float, float],
+) -> None:
+    """In the plant: at a tenth of the strength the capacity is far smaller, but not zero."""
     strong, weak = weak_wall
     assert 0.5 < weak < 0.4 * strong

@@ -1,4 +1,4 @@
-"""Geometry of everything in the cell, with parameters, and its way into SDF files.
+"""Parametric geometry of the parts and machines of the cell, written as SDF models.
 
-``python -m cell.cad`` writes ``models/sdf``; nothing else in the cell imports it.
+``python -m cell.cad`` writes ``models/sdf``; nothing else in the cell imports this package.
 """

@@ -15,7 +15,7 @@ WRITERS = [
     robots.write_models,
     workcell.write_models,
 ]
-"""What writes the models, one function per module of this package."""
+"""Functions that write models into a folder, one per module of this package."""
 
 
 def main(folder: Path) -> None:

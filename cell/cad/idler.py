@@ -1,4 +1,4 @@
-"""The product idler: a post with a shaft, the arm that goes over it, two M3 x 10 bolts, its tray.
+"""The product idler: a post with a shaft, the arm on it, two M3 x 10 bolts, and the tray.
 
 Post and arm are drawn in the product frame A: origin on the shaft's axis at the post's upper face,
 +z along the shaft. Boss, bore, thread and bolts have the sizes of the motor unit's: they are
@@ -37,19 +37,19 @@ from cell.cad.motor_unit import (
     upright_cylinder,
     washer_surface,
 )
-from cell.cad.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
+from cell.cad.sdf import Contact, Model, Piece, Visual, mesh_inertia, write_model
 from cell.cad.shapes import boss, box, cylinder
 from cell.cad.tray import BASE, BASE_GREY, NEST_TEAL, PLASTIC, PRINTED, bolt_nest
 
-# The post: square, so that jaws and bed meet flat sides.
+# The post is square: jaws and bed are in contact with flat sides.
 POST_SIDE, POST_HEIGHT = 34.0, 50.0
 SHAFT_RADIUS, SHAFT_END = 4.0, 24.0
 TAP_DRILL_RADIUS = 1.25  # [R] ISO 2306 for M3 x 0.5.
 # The arm, as thick as the motor's plate: the same bolts fit.
 ARM_X, ARM_Y = 70.0, 40.0
 BOLT_XY = ((13.0, 0.0), (-13.0, 0.0))
-# The face around the washers stands back by this much: the washers carry the clamp, and the face
-# keeps the arm from rocking on them.
+# Clearance of the face around the washers: the washers carry the clamp force, and the face keeps
+# the arm from rocking on them.
 FACE_GAP = 0.02
 WINDOW_X, WINDOW_Y = 20.0, 12.0
 
@@ -80,10 +80,10 @@ def arm_solid() -> Manifold:
 
 
 def post_pieces() -> list[Piece]:
-    """Return the post's contact pieces: its body is felt by bed and jaws, its face by the arm."""
+    """Return the contact pieces of the post: its body for bed and jaws, its face for the arm."""
     metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
     half = POST_SIDE / 2
-    # As a convex mesh its pressure grows evenly under the whole face.
+    # The pressure of a convex mesh grows evenly under the whole face.
     seat = mesh(box((-half, -half, -SEAT_DEPTH), (half, half, 0)))
     return [
         box_piece("bed_body", (-half, -half, -POST_HEIGHT), (half, half, -SEAT_GAP), Contact(0.9)),
@@ -114,14 +114,14 @@ def post_model() -> Model:
     """Return the post."""
     whole = mesh(post_solid())
     inertia = mesh_inertia(whole, ALUMINIUM * whole.volume, "idler_post")
-    return Model("idler_post", inertia, post_pieces(), [Look("post", whole, STEEL_GREY)], whole)
+    return Model("idler_post", inertia, post_pieces(), [Visual("post", whole, STEEL_GREY)], whole)
 
 
 def arm_model() -> Model:
     """Return the arm."""
     whole = mesh(arm_solid())
     inertia = mesh_inertia(whole, ALUMINIUM * whole.volume, "idler_arm")
-    return Model("idler_arm", inertia, arm_pieces(), [Look("arm", whole, ANODISED)], whole)
+    return Model("idler_arm", inertia, arm_pieces(), [Visual("arm", whole, ANODISED)], whole)
 
 
 def post_nest() -> list[Piece]:
@@ -156,11 +156,11 @@ def tray_model() -> Model:
     low, high = (-x / 2, -y / 2, -height), (x / 2, y / 2, 0.0)
     base = box_piece("base", low, high, PLASTIC)
     nests = [*post_nest(), *arm_nest(), *bolt_nest()]
-    looks = [Look("base_look", base.shape, BASE_GREY, base.X_PS)]
-    looks += [Look(f"{p.name}_look", p.shape, NEST_TEAL, p.X_PS) for p in nests]
+    visuals = [Visual("base_look", base.shape, BASE_GREY, base.X_PS)]
+    visuals += [Visual(f"{p.name}_look", p.shape, NEST_TEAL, p.X_PS) for p in nests]
     slab = mesh(box(low, high))
     inertia = mesh_inertia(slab, PRINTED * slab.volume, "idler_tray")
-    return Model("idler_tray", inertia, [base, *nests], looks)
+    return Model("idler_tray", inertia, [base, *nests], visuals)
 
 
 def write_models(folder: Path) -> None:

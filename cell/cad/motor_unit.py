@@ -19,7 +19,7 @@ from manifold3d import Manifold
 from pydrake.geometry import Box, Cylinder
 from pydrake.math import RigidTransform
 
-from cell.cad.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
+from cell.cad.sdf import Contact, Model, Piece, Visual, mesh_inertia, write_model
 from cell.cad.shapes import (
     boss,
     box,
@@ -60,8 +60,8 @@ PLATE_X, PLATE_Y_LOW, PLATE_Y_HIGH, PLATE_THICKNESS = 35.0, -33.0, 27.0, 5.0
 FOOT_THICKNESS, FOOT_BOTTOM = 5.0, -15.0
 FOOT_HOLE_RADIUS, FOOT_HOLE_X, FOOT_HOLE_Z = 2.25, 29.0, -10.0
 BOLT_HOLE_RADIUS = 1.7
-BOLT_HOLE_EDGE = 0.2  # [A] broken by deburring; contact begins outside of it.
-WASHER_RADIUS = 3.4  # [D] of what carries the clamp; at 3.5 it would fill the bore's chamfer.
+BOLT_HOLE_EDGE = 0.2  # [A] deburred; contact begins outside of it.
+WASHER_RADIUS = 3.4  # [D] of the clamped area; at 3.5 it would fill the chamfer of the bore.
 ALUMINIUM = 2700.0  # kg/m3; the material is not in the files [A].
 
 # Bolts: six, every 60 degrees about the gearbox axis [M]; socket head cap screw.
@@ -69,19 +69,19 @@ BOLT_CIRCLE = 15.5
 BOLT_ANGLES_DEG = (0.0, 60.0, 120.0, 180.0, 240.0, 300.0)
 THREAD_RADIUS, BOLT_LENGTH, TIP_CHAMFER = 1.5, 10.0, 0.3
 HEAD_RADIUS, HEAD_HEIGHT = 2.75, 3.0
-BEARING_RADIUS = 2.5  # [R] ISO 4762: 2.53 or more; less what the corners of a hexagon need.
+BEARING_RADIUS = 2.5  # [R] ISO 4762: 2.53 or more; reduced for the corners of a hexagon.
 SOCKET_FLATS, SOCKET_DEPTH = 2.5, 2.0  # [M] 1.3 to 2 mm deep; 2 gives the measured volume.
 THREAD_PITCH = 0.5
 STEEL = 7850.0  # kg/m3
 
 THREAD_FACETS = 32  # Shared by shank and hole, so that they touch line to line when assembled.
-CAN_FACETS = 16  # Fewer make holding torque a matter of corners [M].
+CAN_FACETS = 16  # With fewer the holding torque depends on the corners [M].
 BORE_FACETS = 64  # Sagitta 7 micrometres against 75 of clearance.
 
-# Contact [D]: softer metal lets a misplaced boss squeeze into the hole at tens of newtons.
+# Contact [D]: softer metal would let a misplaced boss squeeze into the hole at tens of newtons.
 METAL_MODULUS = 1e10  # Pa
-# Metal comes off metal at no more than 1/d = 2 mm/s [A]: less than gravity adds in a step of 1 ms.
-# With the 10 s/m of softer things a part on its stiff seat is thrown back for ever [M].
+# Metal rebounds from metal at no more than 1/d = 2 mm/s [A]: less than gravity adds in a step of
+# 1 ms. With the 10 s/m of softer materials a part bounces on its stiff seat for ever [M].
 METAL_DISSIPATION = 500.0  # s/m
 FIT_FRICTION = 0.2  # [A] steel on aluminium, dry.
 NUT_FACTOR = 0.202  # [D] K of T = K d F for mu = 0.14 in thread and under the head.
@@ -93,7 +93,8 @@ ANODISED, BLACK_OXIDE, DARK = (0.62, 0.70, 0.80), (0.16, 0.16, 0.18), (0.28, 0.2
 # Contact meshes [M]: a step costs about 8 us for every contact polygon.
 BOSS_FACETS = 32  # Mean radius is kept; corners and flats differ by 14 um of 75 um clearance.
 WASHER_FACETS, HOLE_FACETS = 6, 8
-# The gearbox is felt twice: its face, compliant, by the plate; its side, rigid, by bed and jaws.
+# The gearbox has two contact pieces: its face, compliant, for the plate; its side, rigid, for bed
+# and jaws.
 # Under a bolt the face yields like the clamped aluminium, 3.5e8 N/m [D]: a modulus of 1e10 over
 # half of this depth on 27 mm2. The head likewise stands for bolt and head, about 1e8 N/m [D].
 SEAT_FACETS, SEAT_DEPTH, SEAT_GAP = 8, 1.5, 0.2
@@ -104,8 +105,8 @@ HEAD_STIFFNESS = 1e8  # N/m
 def lumped_head_friction() -> float:
     """Return the friction under the head that alone gives the nut factor K.
 
-    K d = P / (2 pi) + mu r_eff, with the r_eff of the annulus that the head bears on: the thread
-    itself is simulated frictionless.
+    K d = P / (2 pi) + mu r_eff, with the effective radius r_eff of the bearing annulus of the head:
+    the thread itself is simulated without friction.
     """
     r_eff = friction_radius(BEARING_RADIUS, BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE, WASHER_FACETS)
     return (NUT_FACTOR * 2.0 * THREAD_RADIUS - THREAD_PITCH / (2.0 * np.pi)) / r_eff
@@ -174,7 +175,7 @@ def plate_solid() -> Manifold:
 
 
 def bore_solid() -> Manifold:
-    """Return what the bore takes away of a plate, about the z axis [mm]."""
+    """Return the volume that the bore removes from a plate, about the z axis [mm]."""
     wide, top = BORE_RADIUS + EDGE_BREAK, PLATE_THICKNESS
     bore = cylinder(BORE_RADIUS, -1, top + 1, BORE_FACETS)
     bore += cone(wide + 1, wide - EDGE_BREAK, -1, EDGE_BREAK, BORE_FACETS)
@@ -191,8 +192,8 @@ def bolt_solid() -> Manifold:
 def motor_pieces() -> list[Piece]:
     """Return the motor's contact pieces.
 
-    Rear boss and terminals have none: they sink into the beads, which meet their real surface
-    (`cell.fixtures.soft_jig.frozen.pins`), and nothing else ever reaches them.
+    Rear boss and terminals have none: they sink into the beads, which are in contact with their
+    real surface (`cell.fixtures.soft_jig.frozen.pins`), and nothing else ever reaches them.
     """
     metal = Contact(FIT_FRICTION, METAL_MODULUS, dissipation=METAL_DISSIPATION)
     return [
@@ -200,7 +201,7 @@ def motor_pieces() -> list[Piece]:
         Piece(
             "bed_gearbox", _prism(CAN_FACETS, GEARBOX_BACK, -SEAT_GAP), Contact(0.9), convex=True
         ),
-        # As a convex solid its pressure grows evenly under the whole face, and few tetrahedra meet
+        # The pressure of a convex solid grows evenly under the whole face, and few tetrahedra touch
         # the plate.
         Piece("seat", _prism(SEAT_FACETS, -SEAT_DEPTH, 0.0), metal, convex=True),
         Piece("boss", boss_surface((0, SHAFT_Y * MM)), metal, convex=True),
@@ -209,7 +210,7 @@ def motor_pieces() -> list[Piece]:
 
 
 def boss_surface(center: tuple[float, float]) -> trimesh.Trimesh:
-    """Return the boss about an axis, down into what it stands on [m]."""
+    """Return the boss about an axis, extended 1 mm into its base [m]."""
     side = [(BOSS_RADIUS, -1.0), (BOSS_RADIUS, BOSS_END - EDGE_BREAK)]
     outline = [*side, (BOSS_RADIUS - EDGE_BREAK, BOSS_END)]
     return convex_revolve(_mm(outline), BOSS_FACETS, center)
@@ -219,7 +220,7 @@ def _can_surface() -> trimesh.Trimesh:
     """Return side and rear face of the can [m]; the rear face has every other corner of the side.
 
     The bed conforms to the side facet by facet. On the flat rear face few, large triangles carry as
-    well as many, at a fifth of the cost; the segments left out are a few % of its area.
+    well as many, at a fifth of the cost; the omitted segments are a few % of its area.
     """
     angle = 2.0 * np.pi * (np.arange(CAN_FACETS) + 0.5) / CAN_FACETS
     radius = vertex_radius(CAN_RADIUS, CAN_FACETS)
@@ -256,11 +257,11 @@ def plate_pieces() -> list[Piece]:
 
 
 def washer_surface(center: tuple[float, float]) -> trimesh.Trimesh:
-    """Return what is felt around a bolt's hole [m]: under the head, on the seat, and the wall.
+    """Return the contact surface around a bolt's hole [m]: under the head, on the seat, the wall.
 
-    The wall ends short of both faces: where they are pressed in by micrometres it would only cost.
-    Half a facet of phase keeps its corners inside the flats of the faces, whose edges would
-    otherwise cut into a leaning shank and lift it.
+    The wall ends short of both faces: where they are compressed by micrometres it would only add
+    cost. Half a facet of phase keeps its corners inside the flats of the faces, whose edges would
+    otherwise cut into a tilted shank and lift it.
     """
     inner, top = BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE, PLATE_THICKNESS
     head = [(BEARING_RADIUS, top), (inner, top)]
@@ -271,8 +272,8 @@ def washer_surface(center: tuple[float, float]) -> trimesh.Trimesh:
     return joined(bands)
 
 
-# Of the ring's section only the chamfers and the bore itself: the rest can touch nothing.
-BORE_FELT_EDGES = 4
+# Edges of the ring's section in contact: the chamfers and the bore itself.
+BORE_CONTACT_EDGES = 4
 
 
 def bore_ring(center: tuple[float, float]) -> trimesh.Trimesh:
@@ -282,8 +283,8 @@ def bore_ring(center: tuple[float, float]) -> trimesh.Trimesh:
     inner = [(BORE_RADIUS, top - EDGE_BREAK), (BORE_RADIUS, top / 2), (BORE_RADIUS, EDGE_BREAK)]
     profile = [(wide, top), *inner, (wide - gap, gap), (outer, gap), (outer, top)]
     ring = revolved_surface(_mm(profile), BORE_FACETS, center)
-    felt = np.tile(np.repeat(np.arange(len(profile)) < BORE_FELT_EDGES, BORE_FACETS), 2)
-    ring.update_faces(felt)
+    kept = np.tile(np.repeat(np.arange(len(profile)) < BORE_CONTACT_EDGES, BORE_FACETS), 2)
+    ring.update_faces(kept)
     return ring
 
 
@@ -303,7 +304,7 @@ def _plate_boxes() -> list[Piece]:
 
 def bolt_pieces() -> list[Piece]:
     """Return the bolt's contact pieces."""
-    # As a convex solid its pressure grows evenly from its underside to its middle.
+    # The pressure of a convex solid grows evenly from its underside to its middle.
     bearing = np.pi * (BEARING_RADIUS**2 - (BOLT_HOLE_RADIUS + BOLT_HOLE_EDGE) ** 2) * MM**2
     modulus = HEAD_STIFFNESS * HEAD_HEIGHT / 2 * MM / bearing
     head = Contact(lumped_head_friction(), modulus, dissipation=METAL_DISSIPATION)
@@ -345,29 +346,29 @@ def mesh(solid: Manifold) -> trimesh.Trimesh:
 
 
 def motor_model() -> Model:
-    """Return the motor; its mass is even over its volume."""
+    """Return the motor; its density is uniform."""
     solids = motor_solids()
     colors = {"gearbox": STEEL_GREY, "can": ZINC, "shaft": DARK, "terminals": BRASS}
     whole = mesh(reduce(add, solids.values()))
-    looks = [Look(name, mesh(solid), colors[name]) for name, solid in solids.items()]
+    visuals = [Visual(name, mesh(solid), colors[name]) for name, solid in solids.items()]
     inertia = mesh_inertia(whole, MOTOR_MASS, "motor")
-    return Model("motor", inertia, motor_pieces(), looks, whole)
+    return Model("motor", inertia, motor_pieces(), visuals, whole)
 
 
 def plate_model() -> Model:
     """Return the plate."""
     whole = mesh(plate_solid())
     inertia = mesh_inertia(whole, ALUMINIUM * whole.volume, "motor_plate")
-    look = Look("plate", whole, ANODISED)
-    return Model("motor_plate", inertia, plate_pieces(), [look], whole)
+    visual = Visual("plate", whole, ANODISED)
+    return Model("motor_plate", inertia, plate_pieces(), [visual], whole)
 
 
 def bolt_model() -> Model:
     """Return the bolt."""
     whole = mesh(bolt_solid())
     inertia = mesh_inertia(whole, STEEL * whole.volume, "bolt_m3x10")
-    look = Look("bolt", whole, BLACK_OXIDE)
-    return Model("bolt_m3x10", inertia, bolt_pieces(), [look], whole)
+    visual = Visual("bolt", whole, BLACK_OXIDE)
+    return Model("bolt_m3x10", inertia, bolt_pieces(), [visual], whole)
 
 
 def write_models(folder: Path) -> None:

@@ -1,16 +1,14 @@
-"""SDF models of everything that moves by itself: arms, grippers, driver."""
+"""SDF models of the driven machines: arms, grippers, driver."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
 from pathlib import Path
 
-from cell.cad.gripper_85 import gripper_85
-from cell.cad.hand_e import hand_e
+from cell.cad.arms import seven_axis, ur
+from cell.cad.grippers import gripper_85, hand_e
 from cell.cad.screwdriver import screwdriver
 from cell.cad.sdf_model import SdfModel
-from cell.cad.seven_axis import seven_axis
-from cell.cad.ur import ur
 from cell.machines.arms.seven_axis import IIWA14
 from cell.machines.arms.ur import UR3E, UR5E, UR10E
 

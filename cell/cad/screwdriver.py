@@ -1,10 +1,10 @@
 """SDF of the electric driver: an inline driver held by a general-purpose gripper on the flange.
 
 The gripper that holds the driver never opens, so it and the housing are one rigid ``body``. The
-bit holder floats on two lateral slides and one axial slide with springs, as the heads of
-screwdriving robots do; the ``bit`` turns in it on ``spindle_joint`` about +z of ``mount``. The last
+bit holder floats on two lateral slides and one axial slide with springs, like the heads of
+screwdriving robots; the ``bit`` turns in it on ``spindle_joint`` about +z of ``mount``. The last
 10 mm of the bit have no collision shape: bit and socket are joined by a constraint when they meet
-within their tolerances, and the hex inside the socket would otherwise push the bolt about.
+within their tolerances, and contact of the hex inside the socket would push the bolt around.
 
 Sources: lengths and masses [A], chosen so that the bit passes between bolt heads and motor shaft;
 hex size 2.5 mm for M3 [R ISO 4762]. All lengths in metres.
@@ -18,8 +18,8 @@ import trimesh
 
 from cell.cad.sdf_model import (
     Color,
-    Contact,
-    Inertia,
+    LinkContact,
+    LinkInertia,
     Pose,
     SdfModel,
     box,
@@ -59,7 +59,7 @@ SPINDLE_INERTIA = 1e-5
 SPINDLE_EFFORT = 1.0  # [N m]; the clutch acts below it.
 SPINDLE_SPEED = 105.0  # [rad/s], 1000 rpm.
 SPINDLE_DAMPING = 1e-4  # [N m s/rad]
-CONTACT = Contact("point", friction=0.3)
+CONTACT = LinkContact("point", friction=0.3)
 
 
 def screwdriver() -> SdfModel:
@@ -69,7 +69,7 @@ def screwdriver() -> SdfModel:
     _add_bit(model)
     model.frame("mount", "body")
     model.frame("bit_tip", "bit", Pose(z=SHAFT_LENGTH))
-    # Where the bit's end is at rest: the arm aims with this frame, which does not turn.
+    # The end of the bit at rest: the arm aims with this frame, which does not turn.
     model.frame("tool_tip", "body", Pose(z=BIT_TIP_Z))
     model.ignore_contact_between("driver", ["body", "bit"])
     return model
@@ -79,20 +79,24 @@ def _add_body(model: SdfModel) -> None:
     driver_z = (HOUSING_Z + SHAFT_Z) / 2
     mass = HOLDER_MASS + DRIVER_MASS
     com = (HOLDER_MASS * HOLDER_LENGTH / 2 + DRIVER_MASS * driver_z) / mass
-    model.link("body", Inertia.of_cylinder(mass, 0.030, SHAFT_Z, (0, 0, com)))
+    model.link("body", LinkInertia.of_cylinder(mass, 0.030, SHAFT_Z, (0, 0, com)))
     holder = model.mesh("holder", rounded_cylinder(HOLDER_RADIUS, HOLDER_LENGTH, 0.008))
     model.visual("body", "holder", holder, BLACK)
     model.visual("body", "coupler", cylinder(0.0378, 0.011), STEEL, Pose(z=0.0055))
-    housing = model.mesh("housing", _housing())
+    length, r = NOSE_Z - HOUSING_Z, HOUSING_RADIUS
+    # The housing has a waist at the grip and a shoulder towards the nose.
+    grip = [(r, 0.062), (r - 0.002, 0.066), (r - 0.002, length - 0.022), (r, length - 0.018)]
+    end = [(r, length - 0.008), (NOSE_RADIUS + 0.001, length), (0.0, length)]
+    housing = model.mesh("housing", turned([(0.0, 0.0), (r, 0.0), *grip, *end]))
     model.visual("body", "housing", housing, GREEN, Pose(z=HOUSING_Z))
-    nose = model.mesh("nose", turned(_nose_profile()))
+    tip = [(NOSE_RADIUS, NOSE_LENGTH - 0.010), (NOSE_RADIUS - 0.004, NOSE_LENGTH)]
+    nose = model.mesh("nose", turned([(0, 0), (NOSE_RADIUS, 0), *tip, (0, NOSE_LENGTH)]))
     model.visual("body", "nose", nose, STEEL, Pose(z=NOSE_Z))
     model.visual("body", "collar", cylinder(0.0186, 0.006), BLACK, Pose(z=NOSE_Z - 0.012))
     for side, sign in (("left", 1), ("right", -1)):
         jaw, arm = Pose(sign * 0.023, 0, 0.122), Pose(sign * 0.027, 0, 0.100)
         model.visual("body", f"jaw_{side}", box(0.010, 0.024, 0.040), STEEL, jaw)
         model.visual("body", f"arm_{side}", box(0.014, 0.020, 0.020), BLACK, arm)
-    length = NOSE_Z - HOUSING_Z
     _hull(model, "holder", HOLDER_RADIUS, 0.0, HOLDER_LENGTH)
     _hull(model, "housing", HOUSING_RADIUS + 0.001, HOUSING_Z, length)
     _hull(model, "nose", NOSE_RADIUS, NOSE_Z, NOSE_LENGTH)
@@ -104,22 +108,9 @@ def _hull(model: SdfModel, name: str, radius: float, start: float, length: float
     model.collision("body", name, cylinder(radius, length), CONTACT, Pose(z=start + length / 2))
 
 
-def _housing() -> trimesh.Trimesh:
-    """Return the driver's housing with a grip waist and a shoulder towards the nose."""
-    length, r = NOSE_Z - HOUSING_Z, HOUSING_RADIUS
-    grip = [(r, 0.062), (r - 0.002, 0.066), (r - 0.002, length - 0.022), (r, length - 0.018)]
-    end = [(r, length - 0.008), (NOSE_RADIUS + 0.001, length), (0.0, length)]
-    return turned([(0.0, 0.0), (r, 0.0), *grip, *end])
-
-
-def _nose_profile() -> list[tuple[float, float]]:
-    r, length = NOSE_RADIUS, NOSE_LENGTH
-    return [(0, 0), (r, 0), (r, length - 0.010), (r - 0.004, length), (0, length)]
-
-
 def _add_bit(model: SdfModel) -> None:
     """Add the bit; its link frame is where the shaft leaves the nose."""
-    shaft = Inertia.of_cylinder(BIT_MASS, SHAFT_RADIUS, SHAFT_LENGTH, (0, 0, SHAFT_LENGTH / 2))
+    shaft = LinkInertia.of_cylinder(BIT_MASS, SHAFT_RADIUS, SHAFT_LENGTH, (0, 0, SHAFT_LENGTH / 2))
     model.link("bit", shaft, parent="body", pose=Pose(z=SHAFT_Z))
     model.joint(
         "spindle_joint",
@@ -137,8 +128,8 @@ def _add_bit(model: SdfModel) -> None:
     corner = HEX_FLATS / 2 / math.cos(math.pi / 6)
     hexagon = trimesh.creation.cylinder(corner, HEX_LENGTH, sections=6)
     model.visual("bit", "hex", model.mesh("hex", hexagon), STEEL, Pose(z=SHAFT_LENGTH - 0.007))
-    felt = SHAFT_LENGTH - BARE_END
-    model.collision("bit", "shaft", cylinder(SHAFT_RADIUS, felt), CONTACT, Pose(z=felt / 2))
+    covered = SHAFT_LENGTH - BARE_END
+    model.collision("bit", "shaft", cylinder(SHAFT_RADIUS, covered), CONTACT, Pose(z=covered / 2))
 
 
 def _add_floats(model: SdfModel) -> str:
@@ -146,7 +137,7 @@ def _add_floats(model: SdfModel) -> str:
     parent = "body"
     for name, axis, travel in FLOATS:
         link = f"float_{name}"
-        inertia = Inertia.of_cylinder(FLOAT_MASS, NOSE_RADIUS, NOSE_LENGTH, (0, 0, 0))
+        inertia = LinkInertia.of_cylinder(FLOAT_MASS, NOSE_RADIUS, NOSE_LENGTH, (0, 0, 0))
         model.link(link, inertia, parent="body", pose=Pose(z=SHAFT_Z))
         model.joint(
             f"float_{name}_joint",

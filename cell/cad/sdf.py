@@ -1,7 +1,7 @@
-"""From geometry to SDF text: one link with exact inertia, visuals and contact pieces.
+"""SDF text of a part or tray: one link with exact inertia, visuals and contact pieces.
 
-The contact pieces are simpler than the drawn part and carry their own friction and stiffness, so
-that each pair of surfaces that should have a hole really has one.
+The contact pieces are simpler than the drawn part and have their own friction and stiffness; they
+preserve the clearances between mating surfaces.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ Color = tuple[float, float, float]
 
 @dataclass(frozen=True)
 class Contact:
-    """How a piece touches.
+    """Contact properties of a piece.
 
     Attributes:
         friction: Static and dynamic coefficient. Drake combines two as 2 a b / (a + b), so equal
@@ -49,11 +49,11 @@ class Piece:
     """One collision geometry.
 
     Attributes:
-        name: Those that touch the jig's bed start with ``bed_``.
+        name: Starts with ``bed_`` if it touches the bed of the jig.
         shape: Primitive, or a surface in the part's frame P [m].
-        contact: How it touches.
+        contact: Its contact properties.
         X_PS: Pose of the shape.
-        convex: For a surface only: it is its own convex hull.
+        convex: Whether a surface is its own convex hull.
     """
 
     name: str
@@ -64,7 +64,7 @@ class Piece:
 
 
 @dataclass(frozen=True)
-class Look:
+class Visual:
     """One visual geometry: a primitive or a surface in the part's frame P [m], and its colour."""
 
     name: str
@@ -89,21 +89,25 @@ class Model:
     Attributes:
         name: Name of the model.
         inertia: Of its only link.
-        pieces: What touches.
-        looks: What is seen.
-        whole: Closed surface in P [m] for planning, written as ``<name>.obj``; None for a
-            fixture, which is not planned with.
+        pieces: Its collision geometries.
+        visuals: Its visible shapes.
+        whole: Closed surface in P [m] for planning, written as ``<name>.obj``; None for a tray,
+            which is not part of a plan.
     """
 
     name: str
     inertia: Inertia
     pieces: Sequence[Piece]
-    looks: Sequence[Look]
+    visuals: Sequence[Visual]
     whole: trimesh.Trimesh | None = None
 
 
 def mesh_inertia(mesh: trimesh.Trimesh, mass: float, name: str = "part") -> Inertia:
-    """Return the inertia of a body of even density with the given surface [m] and mass [kg]."""
+    """Return the inertia of a body of uniform density with a closed surface [m] and a mass [kg].
+
+    Raises:
+        BadPart: The mass is not positive; `name` is that of the part.
+    """
     if not mass > 0.0:
         raise BadPart(name, f"its mass is {mass:g} kg; a mass is positive")
     properties = mesh.mass_properties
@@ -118,9 +122,9 @@ def write_model(folder: Path, model: Model) -> Path:
     for piece in model.pieces:
         if isinstance(piece.shape, trimesh.Trimesh):
             (home / f"{piece.name}_contact.obj").write_text(obj_text(piece.shape))
-    for look in model.looks:
-        if isinstance(look.shape, trimesh.Trimesh):
-            (home / f"{look.name}_visual.obj").write_text(obj_text(look.shape, normals=True))
+    for visual in model.visuals:
+        if isinstance(visual.shape, trimesh.Trimesh):
+            (home / f"{visual.name}_visual.obj").write_text(obj_text(visual.shape, normals=True))
     if model.whole is not None:
         (home / f"{model.name}.obj").write_text(obj_text(model.whole))
     path = home / f"{model.name}.sdf"
@@ -132,7 +136,7 @@ def sdf_text(model: Model) -> str:
     """Return the SDF of a model whose meshes lie in ``models/sdf/<name>``."""
     uri = f"package://soft_jig_models/sdf/{model.name}"
     body = [_inertial(model.inertia)]
-    body += [_visual(look, uri) for look in model.looks]
+    body += [_visual(visual, uri) for visual in model.visuals]
     body += [_collision(piece, uri) for piece in model.pieces]
     return (
         '<?xml version="1.0"?>\n<!-- Written by "python -m cell.cad"; edit the source there. -->\n'
@@ -148,7 +152,7 @@ def _inertial(inertia: Inertia) -> str:
     I = inertia.I_Cm_P  # noqa: E741 - the letter of the quantity.
     names = {"ixx": I[0, 0], "iyy": I[1, 1], "izz": I[2, 2]}
     names |= {"ixy": I[0, 1], "ixz": I[0, 2], "iyz": I[1, 2]}
-    # Symmetry leaves 1e-22 where there is a zero; it would differ between machines.
+    # Rounding leaves 1e-22 in place of zeros; it would differ between machines.
     floor = 1e-9 * float(np.trace(I))
     rows = "".join(
         f"          <{k}>{v if abs(v) > floor else 0.0:.9e}</{k}>\n" for k, v in names.items()
@@ -161,13 +165,13 @@ def _inertial(inertia: Inertia) -> str:
     )
 
 
-def _visual(look: Look, uri: str) -> str:
+def _visual(visual: Visual, uri: str) -> str:
     """Return a visual element."""
-    color = " ".join(f"{c:.3g}" for c in (*look.color, 1.0))
-    mesh_uri = f"{uri}/{look.name}_visual.obj"
+    color = " ".join(f"{c:.3g}" for c in (*visual.color, 1.0))
+    mesh_uri = f"{uri}/{visual.name}_visual.obj"
     return (
-        f'      <visual name="{look.name}">\n        <pose>{_pose(look.X_PS)}</pose>\n'
-        f"        <geometry>{_geometry(look.shape, mesh_uri, False)}</geometry>\n"
+        f'      <visual name="{visual.name}">\n        <pose>{_pose(visual.X_PS)}</pose>\n'
+        f"        <geometry>{_geometry(visual.shape, mesh_uri, False)}</geometry>\n"
         f"        <material><diffuse>{color}</diffuse></material>\n      </visual>\n"
     )
 

@@ -1,7 +1,7 @@
-"""Write an SDF model of a machine: links with primitive or turned shapes, joints and frames.
+"""SDF models of machines: links with primitive or revolved shapes, joints and frames.
 
-Shapes are placed by their pose in the link frame L. Text is written with twelve significant digits
-and the files have no dates in them, so the same code writes the same bytes.
+Shapes are placed by their pose in the link frame L. Numbers have twelve significant digits and the
+files contain no dates, so the same code writes the same bytes.
 """
 
 from __future__ import annotations
@@ -38,8 +38,8 @@ class Pose:
 
 
 @dataclass(frozen=True)
-class Contact:
-    """How a collision shape touches.
+class LinkContact:
+    """Contact properties of a collision shape.
 
     Attributes:
         kind: "point" (no hydroelastic representation), "rigid" or "compliant".
@@ -70,7 +70,7 @@ class Contact:
 
 
 @dataclass(frozen=True)
-class Inertia:
+class LinkInertia:
     """Mass [kg], centre of mass in L [m], and principal moments about it, axes along L [kg m2]."""
 
     mass: float
@@ -78,18 +78,18 @@ class Inertia:
     moments: tuple[float, float, float]
 
     @staticmethod
-    def of_box(mass: float, size: Sequence[float], com: tuple[float, float, float]) -> Inertia:
+    def of_box(mass: float, size: Sequence[float], com: tuple[float, float, float]) -> LinkInertia:
         """Return the inertia of a homogeneous box with edges ``size`` (3,)."""
         x2, y2, z2 = (mass / 12 * length**2 for length in size)
-        return Inertia(mass, com, (y2 + z2, x2 + z2, x2 + y2))
+        return LinkInertia(mass, com, (y2 + z2, x2 + z2, x2 + y2))
 
     @staticmethod
     def of_cylinder(
         mass: float, radius: float, length: float, com: tuple[float, float, float]
-    ) -> Inertia:
+    ) -> LinkInertia:
         """Return the inertia of a homogeneous cylinder about z."""
         across = mass * (3 * radius**2 + length**2) / 12
-        return Inertia(mass, com, (across, across, mass * radius**2 / 2))
+        return LinkInertia(mass, com, (across, across, mass * radius**2 / 2))
 
 
 def box(x: float, y: float, z: float) -> ElementTree.Element:
@@ -108,7 +108,7 @@ def capsule(radius: float, length: float) -> ElementTree.Element:
 
 
 class SdfModel:
-    """An SDF model under construction; ``write`` puts it and its meshes into a folder."""
+    """Builder of an SDF model; ``write`` writes it and its meshes into a folder."""
 
     def __init__(self, name: str) -> None:
         self.name = name
@@ -118,7 +118,12 @@ class SdfModel:
         self._meshes: dict[str, trimesh.Trimesh] = {}
 
     def link(
-        self, name: str, inertia: Inertia, *, parent: str | None = None, pose: Pose | None = None
+        self,
+        name: str,
+        inertia: LinkInertia,
+        *,
+        parent: str | None = None,
+        pose: Pose | None = None,
     ) -> None:
         """Add a link, placed by its pose relative to the link ``parent``."""
         link = ElementTree.SubElement(self._model, "link", name=name)
@@ -137,7 +142,7 @@ class SdfModel:
     def visual(
         self, link: str, name: str, geometry: ElementTree.Element, color: Color, pose: Pose = Pose()
     ) -> None:
-        """Add a coloured shape that is only seen."""
+        """Add a coloured visual shape."""
         visual = self._shape("visual", link, name, geometry, pose)
         material = ElementTree.SubElement(visual, "material")
         _add(material, "diffuse", *color, 1.0)
@@ -147,10 +152,10 @@ class SdfModel:
         link: str,
         name: str,
         geometry: ElementTree.Element,
-        contact: Contact,
+        contact: LinkContact,
         pose: Pose = Pose(),
     ) -> None:
-        """Add a shape that is only felt."""
+        """Add a collision shape."""
         self._shape("collision", link, name, geometry, pose).append(contact.element())
 
     def mesh(self, name: str, mesh: trimesh.Trimesh) -> ElementTree.Element:
@@ -209,7 +214,7 @@ class SdfModel:
         _add(frame, "pose", *(float(word) for word in pose.text().split()))
 
     def ignore_contact_between(self, name: str, links: Sequence[str]) -> None:
-        """Never let these links touch each other."""
+        """Exclude collisions between these links."""
         group = ElementTree.SubElement(self._model, "drake:collision_filter_group", name=name)
         for link in links:
             ElementTree.SubElement(group, "drake:member").text = link
@@ -270,7 +275,7 @@ def tag(
 
 
 def turned(profile: Sequence[tuple[float, float]], sections: int = 48) -> trimesh.Trimesh:
-    """Turn a profile of (radius, height) points, given from the bottom up, about z."""
+    """Return the surface of revolution about z of (radius, height) points, bottom up [m]."""
     return trimesh.creation.revolve(np.array(profile), sections=sections)
 
 

@@ -1,6 +1,6 @@
-"""Solids for drawing parts (manifold3d) and well-shaped surfaces for contact (plain rings).
+"""Solids for drawing parts (manifold3d) and well-shaped surfaces of revolution for contact.
 
-Everything is in metres. A solid of revolution has its axis along +z through the origin.
+Lengths are in metres. A solid of revolution has its axis along +z through the origin.
 """
 
 from __future__ import annotations
@@ -74,9 +74,9 @@ def revolved_surface(
     """Return the closed surface that a closed profile sweeps around the vertical through a centre.
 
     Args:
-        profile: (m) corners (mean radius, z) [m], counter-clockwise seen with r right and z up;
-            no corner on the axis. Every edge becomes one ring of ``2 * facets`` triangles, so
-            the caller decides how well shaped they are.
+        profile: (m) corners (mean radius, z) [m], counter-clockwise with r right and z up, none on
+            the axis. Every edge becomes one ring of ``2 * facets`` triangles, whose shape is
+            thus up to the caller.
         facets: Number of sectors.
         center: (x, y) of the axis [m].
         phase: Angle of the first vertices, in sectors.
@@ -93,14 +93,14 @@ def revolved_surface(
 def open_band(
     profile: Sequence[tuple[float, float]], facets: int, center: Point = (0, 0), phase: float = 0.0
 ) -> trimesh.Trimesh:
-    """Return the open surface that a line from one (mean radius, z) to the next sweeps [m].
+    """Return the open surface of revolution of a line of (mean radius, z) corners [m].
 
     The arguments are those of `revolved_surface`; the surface faces right of the line.
     """
     band = revolved_surface(profile, facets, center, phase)
     # The last edge of the closed profile leads back to its start.
-    felt = np.tile(np.repeat(np.arange(len(profile)) < len(profile) - 1, facets), 2)
-    band.update_faces(felt)
+    kept = np.tile(np.repeat(np.arange(len(profile)) < len(profile) - 1, facets), 2)
+    band.update_faces(kept)
     return band
 
 

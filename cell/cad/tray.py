@@ -1,8 +1,8 @@
 """The parts tray of motor_unit: cradles for the motor, ledges for the plate, rails for the bolts.
 
-Frame T: origin at the centre of the base plate's top face, +z up. The nests leave room for a
-gripper that comes straight down: fingers reach 18 mm below the middle of a gripped part, and the
-wide pads pass outside of it. Stops leave 1 mm of play. Lengths in millimetres, all [D] from the
+Frame T: origin at the centre of the base plate's top face, +z up. The nests clear a gripper
+that comes straight down: fingers reach 18 mm below the middle of a gripped part, and the wide pads
+pass outside of it. Stops have 1 mm of play. Lengths in millimetres, all [D] from the
 parts and the gripper.
 """
 
@@ -22,7 +22,7 @@ from cell.cad.motor_unit import (
     MM,
     box_piece,
 )
-from cell.cad.sdf import Contact, Look, Model, Piece, mesh_inertia, write_model
+from cell.cad.sdf import Contact, Model, Piece, Visual, mesh_inertia, write_model
 from cell.cad.shapes import box, to_trimesh, vertex_radius
 
 BASE = (260.0, 200.0, 8.0)
@@ -37,7 +37,7 @@ PLATE_X, PLATE_Y, PLATE_Z = 70.0, 40.0, 30.0
 
 # Bolts hang by their heads between two rails, 16 mm apart.
 BOLT_Y, BOLT_Z, BOLT_SPACING, RAIL_GAP = -70.0, 24.0, 16.0, 3.7
-# A ridge ends inside of the head's rim, even off centre by 0.3.
+# A ridge ends inside the rim of the head, even off centre by 0.3.
 RAIL_WIDTH, RIDGE_WIDTH, RIDGE_HEIGHT = 6.0, 0.6, 4.0
 
 PLASTIC = Contact(0.5, 1e8, dissipation=5.0)  # [A] printed polymer, stiff against part weights.
@@ -106,28 +106,28 @@ def bolt_nest() -> list[Piece]:
     return pieces
 
 
-def _webs() -> list[Look]:
-    """Return the blocks that carry the slabs of the motor's cradles; they are only seen."""
+def _webs() -> list[Visual]:
+    """Return the blocks that carry the slabs of the motor's cradles; visual only."""
     x = MOTOR_AXIS_X
-    looks = []
+    visuals = []
     for name, y_low, y_high in (("web_front", 38.0, 54.0), ("web_rear", 5.5, 11.5)):
         for side, low, high in (("left", -20.5, -9.0), ("right", 9.0, 20.5), ("middle", -9.0, 9.0)):
             top = 3.0 if side == "middle" else 13.0
             web = box_piece(name, (x + low, y_low, 0), (x + high, y_high, top), PLASTIC)
-            looks.append(Look(f"{name}_{side}", web.shape, NEST_TEAL, web.X_PS))
-    return looks
+            visuals.append(Visual(f"{name}_{side}", web.shape, NEST_TEAL, web.X_PS))
+    return visuals
 
 
 def tray_model() -> Model:
-    """Return the tray; every contact piece is also seen."""
+    """Return the tray; every contact piece is visible, too."""
     x, y, height = BASE
     base = box_piece("base", (-x / 2, -y / 2, -height), (x / 2, y / 2, 0), PLASTIC)
     nests = [*motor_nest(), *plate_nest(), *bolt_nest()]
-    looks = [Look("base_look", base.shape, BASE_GREY, base.X_PS), *_webs()]
-    looks += [Look(f"{p.name}_look", p.shape, NEST_TEAL, p.X_PS) for p in nests]
+    visuals = [Visual("base_look", base.shape, BASE_GREY, base.X_PS), *_webs()]
+    visuals += [Visual(f"{p.name}_look", p.shape, NEST_TEAL, p.X_PS) for p in nests]
     slab = to_trimesh(box((-x / 2, -y / 2, -height), (x / 2, y / 2, 0)).scale([MM, MM, MM]))
     inertia = mesh_inertia(slab, PRINTED * slab.volume, "motor_unit_tray")
-    return Model("motor_unit_tray", inertia, [base, *nests], looks)
+    return Model("motor_unit_tray", inertia, [base, *nests], visuals)
 
 
 def write_models(folder: Path) -> None:

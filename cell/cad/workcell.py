@@ -1,4 +1,4 @@
-"""SDF models of what stands still: table, riser, force plate and the base of the jig.
+"""SDF models of the static furniture: table, riser, force plate and the base of the jig.
 
 Each model has one link. The table's origin is the centre of its top face; riser, force plate and
 jig base share the jig frame J (centre of the base plate's top face, +z up), so that one pose places
@@ -18,8 +18,8 @@ import trimesh
 
 from cell.cad.sdf_model import (
     Color,
-    Contact,
-    Inertia,
+    LinkContact,
+    LinkInertia,
     Pose,
     SdfModel,
     box,
@@ -44,7 +44,7 @@ TOP: Color = (0.62, 0.58, 0.50)
 
 CORNERS = ((1, 1), (1, -1), (-1, 1), (-1, -1))
 TABLE_SIZE = (1.8, 1.2, 0.05)  # [A]
-TABLE_HEIGHT = 0.75  # Above the floor; only seen [A].
+TABLE_HEIGHT = 0.75  # Above the floor; visual only [A].
 FORCE_PLATE_SIZE = (0.30, 0.30, 0.035)  # [A] a common size.
 RIM_HEIGHT = 0.006  # [A]
 FORCE_PLATE_TOP = -BASE_HEIGHT  # In J.
@@ -52,12 +52,12 @@ RISER_TOP = FORCE_PLATE_TOP - FORCE_PLATE_SIZE[2]
 RISER_SIZE = (0.26, 0.26, J_HEIGHT + RISER_TOP)
 
 # Rigid: every part that is set down has a compliant side. Friction of metal on metal [A].
-STATIC_CONTACT = Contact("rigid", friction=0.3, hint=0.05)
-# Compliant so that a jig that slides freely rests on a pressed area and not on one point; stiff
-# as hard rubber feet. Thirteen sectors: with three it tips over the edges of a triangle [M]. With
-# less dissipation it rocks and slams while it is pushed, by hundreds of newtons [M]. Friction of
+STATIC_CONTACT = LinkContact("rigid", friction=0.3, hint=0.05)
+# Compliant, so that a sliding jig rests on an area instead of a point; as stiff as hard rubber
+# feet. Thirteen sectors: with three it tips over the edges of a triangle [M]. With less dissipation
+# it rocks and slams at hundreds of newtons while it is pushed [M]. Friction of
 # the base on the force plate 0.3 [A].
-JIG_CONTACT = Contact("compliant", friction=0.3, modulus=1e8, dissipation=100.0, hint=0.04)
+JIG_CONTACT = LinkContact("compliant", friction=0.3, modulus=1e8, dissipation=100.0, hint=0.04)
 
 
 def table() -> SdfModel:
@@ -109,13 +109,13 @@ def force_plate() -> SdfModel:
 def jig_base() -> SdfModel:
     """Return the jig's base plate; its link frame is the jig frame J.
 
-    The clamping rim and its four screws at 90 deg [S] are seen only: nothing reaches them but the
-    bag, which the soft jig itself describes.
+    The clamping rim and its four screws at 90 deg [S] are visual only: nothing reaches them but the
+    bag, which is part of the soft jig.
     """
     radius, aperture = BASE_DIAMETER / 2, APERTURE_DIAMETER / 2
     model = SdfModel("jig_base")
     mass, middle = JIG_MASS - BEAD_MASS, (0, 0, -BASE_HEIGHT / 2)
-    model.link("jig_base", Inertia.of_cylinder(mass, radius, BASE_HEIGHT, middle))
+    model.link("jig_base", LinkInertia.of_cylinder(mass, radius, BASE_HEIGHT, middle))
     body = model.mesh("body", rounded_cylinder(radius, BASE_HEIGHT - RIM_HEIGHT, 0.0005))
     model.visual("jig_base", "body", body, DARK, Pose(z=-BASE_HEIGHT))
     floor = cylinder(aperture, RIM_HEIGHT - 0.0005)
@@ -139,7 +139,7 @@ def _slab(name: str, size: tuple[float, float, float], mass: float, top: float =
     """Return a model with one link and one collision box whose top face is at z = ``top``."""
     model = SdfModel(name)
     middle = top - size[2] / 2
-    model.link(name, Inertia.of_box(mass, size, (0, 0, middle)))
+    model.link(name, LinkInertia.of_box(mass, size, (0, 0, middle)))
     model.collision(name, name, box(*size), STATIC_CONTACT, Pose(z=middle))
     return model
 

@@ -1,8 +1,8 @@
 """The devices that a configuration names: arms by model, each with a tool by model.
 
 A device is its SDF, a drive, readings and limits. To add an arm or a gripper, describe its model
-in `cell.machines.arms` or `cell.machines.grippers`; for another kind of tool, add a line to
-`TOOLS`.
+in `cell.machines.arms` or `cell.machines.grippers`, or put it into their registry; for another kind
+of tool, add a line to `OTHER_TOOLS`.
 """
 
 from __future__ import annotations
@@ -29,11 +29,13 @@ class ToolKind:
 
     Attributes:
         role: What it is for: "gripper" or "driver".
+        sdf: Name of its model in models/sdf, or a URL.
         drive: Makes its drive.
         add: Makes its handle from plant, model instance, device name and drive.
     """
 
     role: str
+    sdf: str
     drive: Callable[[], JointDrive]
     add: Callable[[MultibodyPlant, ModelInstanceIndex, str, JointDrive], Tool]
 
@@ -41,14 +43,15 @@ class ToolKind:
 def _gripper(model: GripperModel) -> ToolKind:
     return ToolKind(
         Gripper.role,
+        model.sdf,
         lambda: GripperDrive(model),
         lambda plant, instance, name, drive: Gripper.add(plant, instance, name, model, drive),
     )
 
 
-# By the name of the SDF model.
-TOOLS: dict[str, ToolKind] = {name: _gripper(model) for name, model in GRIPPER_MODELS.items()} | {
-    "screwdriver": ToolKind(Driver.role, DriverDrive, Driver.add)
+# Tools that are no grippers, by name.
+OTHER_TOOLS: dict[str, ToolKind] = {
+    "screwdriver": ToolKind(Driver.role, "screwdriver", DriverDrive, Driver.add)
 }
 
 
@@ -87,9 +90,11 @@ def make_drives(config: CellConfig) -> dict[str, DeviceDrives]:
 
 def tool_kind(name: str) -> ToolKind:
     """Return how the tool of a name is added."""
-    if name not in TOOLS:
-        raise UnknownName("tool", name, TOOLS)
-    return TOOLS[name]
+    if name in GRIPPER_MODELS:
+        return _gripper(GRIPPER_MODELS[name])
+    if name not in OTHER_TOOLS:
+        raise UnknownName("tool", name, [*GRIPPER_MODELS, *OTHER_TOOLS])
+    return OTHER_TOOLS[name]
 
 
 def add_arms(
@@ -105,5 +110,5 @@ def add_arms(
         ) -> Tool:
             return kind.add(plant, instance, own.tool_name, own.tool)
 
-        arms[name] = add_arm(plant, name, arm_model(arm.model), arm, own.arm, arm.tool, add_tool)
+        arms[name] = add_arm(plant, name, arm_model(arm.model), arm, own.arm, kind.sdf, add_tool)
     return arms

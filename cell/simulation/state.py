@@ -1,16 +1,13 @@
 """Save and restore all state of a run: continuing from a restored state is bit-identical.
 
 A saved state is a flat mapping of names to arrays. It also says what it is of: product,
-configuration and Drake's version; a state of another cell is refused.
+configuration, bodies and Drake's version; a state of another cell is refused.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
 import zlib
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
@@ -18,9 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from cell.bodies import full_name
-from cell.builder import Cell
 from cell.errors import InputError
-from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 
 State = dict[str, np.ndarray]
@@ -34,7 +29,7 @@ def save_state(simulation: Simulation) -> State:
     bodies = [part.body for part in cell.parts]
     asleep = {part.part.name: np.array(part.asleep(root)) for part in cell.parts}
     state: dict[str, Any] = {
-        "of": {name: np.array(value) for name, value in _identity(cell).items()},
+        "of": {name: np.array(value) for name, value in simulation.identity.items()},
         "steps": np.array(simulation.steps),
         "q": cell.plant.GetPositions(context).copy(),
         "v": cell.plant.GetVelocities(context).copy(),
@@ -60,7 +55,7 @@ def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> No
         InputError: A state of another product, configuration or Drake, or an incomplete or damaged
             one.
     """
-    _check_identity(simulation.cell, state)
+    _check_identity(simulation, state)
     try:
         _check_complete(simulation, state)
         _restore(simulation, _nested(state))
@@ -97,28 +92,8 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     simulation.simulator.Initialize()
 
 
-def _identity(cell: Cell) -> dict[str, str]:
-    """Return what a saved state holds for: product, configuration, Drake's version."""
-    text = json.dumps(cell.config.to_dict(), sort_keys=True, default=str)
-    return {
-        "product": f"{cell.product.name} {_digest_of(cell.product)}",
-        "configuration": hashlib.sha256(text.encode()).hexdigest()[:16],
-        "Drake": version("drake"),
-    }
-
-
-def _digest_of(product: Product) -> str:
-    """Return a digest of what a product's file and meshes say about its parts and joints."""
-    digest = hashlib.sha256(repr(product.joints).encode())
-    for part in product.parts.values():
-        digest.update(f"{part.name} {part.mass} {part.model} {part.X_AP} {part.X_TrayP}".encode())
-        digest.update(np.ascontiguousarray(part.mesh.vertices).tobytes())
-        digest.update(np.ascontiguousarray(part.mesh.faces).tobytes())
-    return digest.hexdigest()[:16]
-
-
-def _check_identity(cell: Cell, state: Mapping[str, np.ndarray]) -> None:
-    for what, now in _identity(cell).items():
+def _check_identity(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
+    for what, now in simulation.identity.items():
         then = str(state.get(f"of/{what}", "unknown"))
         if then != now:
             raise InputError(f"The saved state is of another {what}: {then}, not {now}.")

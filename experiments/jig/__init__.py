@@ -1,4 +1,4 @@
-"""Element tests of the soft jig alone: the rig, what is pressed into the bed, and each test.
+"""Element tests of the soft jig alone: the rig, the specimens, and each test.
 
-The discrete-element figures that they are compared with lie beside them.
+`element_reference.yaml` has the discrete-element results that they are compared with.
 """

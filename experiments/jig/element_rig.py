@@ -1,7 +1,7 @@
-"""One part on a guided, driven carriage over a fixed soft jig: the rig of the element tests.
+"""The rig of the element tests: one part on a driven vertical carriage over a fixed soft jig.
 
-The part is lowered to a depth, the bag is jammed, the carriage lets go, and a stiff spring
-drags the part sideways or up at constant speed. Force and displacement are recorded.
+The part is lowered to a depth, the bag is jammed, the carriage lets go, and a stiff spring drags
+the part sideways or up at constant speed. Force and displacement are recorded.
 """
 
 from __future__ import annotations
@@ -24,6 +24,7 @@ from pydrake.multibody.tree import (
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import DiagramBuilder
 
+from cell.errors import RunFailure
 from cell.fixtures.soft_jig import JigParameters, SoftJig
 from cell.fixtures.wiring import wire_fixture
 from cell.forces import applied_force
@@ -32,15 +33,21 @@ from experiments.jig.specimens import Prism, Specimen
 
 Array = NDArray[np.float64]
 
-# The spring between the drag's target and the cylinder [N/m], and its damper [N s/m]: stiff
-# against the bed's 10 to 100 N/mm, soft enough for an explicit force at 1 ms on 0.2 kg.
+# The spring between the target of the drag and the part [N/m], and its damper [N s/m]: stiff
+# against the 10 to 100 N/mm of the bed, soft enough for an explicit force at 1 ms on 0.2 kg.
 DRAG_STIFFNESS = 2.0e4
 DRAG_DAMPING = 40.0
 
 
 @dataclass(frozen=True)
 class Drag:
-    """What a drag measured, per step: displacement [m], force [N], tilt [rad]."""
+    """The record of a drag, per step (n,).
+
+    Attributes:
+        way: Displacement of the dragged point along the direction [m].
+        force: Of the spring [N].
+        tilt: Rotation of the part since the start [rad].
+    """
 
     way: Array
     force: Array
@@ -48,14 +55,14 @@ class Drag:
 
     @property
     def holding_force(self) -> float:
-        """Largest force once the part has moved by 0.05 mm, median over 5 steps [N].
+        """Largest force after the part has moved by 0.05 mm, median over 5 steps [N].
 
         Raises:
-            ValueError: It never moved: the spring is too soft for what holds it.
+            RunFailure: The part did not move: the spring is too soft.
         """
         moved = np.flatnonzero(self.way > 0.05e-3)
         if len(moved) == 0 or len(self.force) - moved[0] < 5:
-            raise ValueError(f"The part did not move under {self.force.max():.3g} N.")
+            raise RunFailure(f"The part did not move under {self.force.max():.3g} N.")
         moving = self.force[moved[0] :]
         smooth = np.median(np.lib.stride_tricks.sliding_window_view(moving, 5), axis=1)
         return float(smooth.max())
@@ -63,14 +70,14 @@ class Drag:
 
 @dataclass
 class ElementRig:
-    """The diagram and its simulator; all poses in J, which coincides with W here.
+    """The diagram and its simulator; all poses in J, which coincides with W.
 
     Attributes:
         params: Of the jig.
-        part: What is pressed into the bed.
+        part: The specimen.
         press_force: Limit of the carriage's drive [N].
         time_step: [s].
-        approximation: Drake's discrete contact approximation.
+        approximation: Discrete contact approximation of Drake.
     """
 
     params: JigParameters = field(default_factory=JigParameters)
@@ -111,7 +118,7 @@ class ElementRig:
 
     @staticmethod
     def X_JC(height: float) -> RigidTransform:
-        """Return the carriage's pose."""
+        """Return the pose of the carriage at a height [m]."""
         return RigidTransform([0.0, 0.0, height])
 
     def _add_carriage(self) -> None:
@@ -145,7 +152,7 @@ class ElementRig:
             self.simulator.AdvanceTo(self._steps * self.time_step)
 
     def lower_to(self, depth: float, speed: float = 0.02) -> Array:
-        """Press the part to a depth below the apex [m]; return depth and force rows (n, 2)."""
+        """Press the part to a depth below the apex [m]; return depth [m] and force [N] (n, 2)."""
         goal, curve = self.params.bag.cap_height - depth, []
         while self._height > goal:
             self._set_height(max(self._height - speed * self.time_step, goal), -speed)
@@ -162,7 +169,7 @@ class ElementRig:
         return float(forces[0].F_Bq_W.translational()[2]) if forces else 0.0
 
     def jam(self) -> None:
-        """Evacuate until the pressure is there, then hold the place instead of pressing on."""
+        """Evacuate until the bed is frozen, then stop the carriage where it is."""
         self.jig.evacuate(self.root)
         while not self.jig.fixed(self.root):
             self.step()
@@ -170,20 +177,28 @@ class ElementRig:
         self.step(round(0.5 / self.time_step))
 
     def let_go(self, wait: float = 0.5) -> None:
-        """Open the grip and wait [s]."""
+        """Open the grip, retract the carriage and wait [s]."""
         self.plant.SetConstraintActiveStatus(self.context, self._grip, False)
         self._set_height(0.3, 0.0)
         self.step(round(wait / self.time_step))
 
     def drag(self, p_PQ: Array, direction: Array, way: float = 0.006, speed: float = 0.01) -> Drag:
-        """Drag point Q of the part along a direction of J [m]; the target moves at `speed`."""
+        """Drag a point of the part along a straight line, at constant speed of the target.
+
+        Args:
+            p_PQ: (3,) the point, in P [m].
+            direction: (3,) unit vector in J.
+            way: Of the target [m].
+            speed: Of the target [m/s].
+        """
         p_JQ0, R_JP0 = self.X_JP @ p_PQ, self.X_JP.rotation()
         rows = []
         while (target := speed * self.time_step * len(rows)) < way:
             moved = float(direction @ (self.X_JP @ p_PQ - p_JQ0))
-            force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (
-                speed - self._rate(p_PQ, direction)
-            )
+            V_WP = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.body)
+            V_WQ = V_WP.Shift(self.X_JP.rotation() @ p_PQ)
+            rate = float(direction @ V_WQ.translational())
+            force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (speed - rate)
             pull = SpatialForce(np.zeros(3), max(force, 0.0) * direction)
             self._forces.fix(self.root, "external", [applied_force(self.body.index(), p_PQ, pull)])
             self.step()
@@ -191,11 +206,6 @@ class ElementRig:
             rows.append((moved, max(force, 0.0), turn))
         self._forces.fix(self.root, "external", [])
         return Drag(*np.array(rows).T)
-
-    def _rate(self, p_PQ: Array, direction: Array) -> float:
-        V_WP = self.plant.EvalBodySpatialVelocityInWorld(self.context, self.body)
-        arm = self.X_JP.rotation() @ p_PQ
-        return float(direction @ V_WP.Shift(arm).translational())
 
     @property
     def speed(self) -> float:
@@ -210,6 +220,6 @@ class ElementRig:
 
     @property
     def depth(self) -> float:
-        """How far the part's lowest point is below the apex of the inflated bag [m]."""
+        """Depth of the part's lowest point below the apex of the inflated bag [m]."""
         low = (self.X_JP @ self._X_CP.inverse()).translation()[2]
         return self.params.bag.cap_height - float(low)

@@ -1,6 +1,6 @@
 """The element tests: a punch into the bed, and a cylinder in it that is pushed and pulled.
 
-`experiments.jig_element_tests` runs them and says why they differ from the reference.
+`experiments.jig_element_tests` runs them and explains the differences from the reference.
 """
 
 from __future__ import annotations
@@ -24,22 +24,22 @@ from experiments.jig.specimens import Prism
 Array = NDArray[np.float64]
 
 CYLINDER = Prism()
-PUSH_HEIGHT = 0.040  # Over the bed's apex [m].
-END = np.pi * CYLINDER.radius**2  # Of the cylinder [m2].
-REFERENCE_PRESSURE = 1e3  # On the reference's dome while soft [Pa].
+PUSH_HEIGHT = 0.040  # Above the apex of the bed [m].
+END = np.pi * CYLINDER.radius**2  # Area of an end face of the cylinder [m2].
+REFERENCE_PRESSURE = 1e3  # Surcharge on the soft dome of the reference [Pa].
 SIDEWAYS, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
 
 
 def reference() -> dict[str, Any]:
-    """Return the discrete-element figures."""
+    """Return the discrete-element results."""
     text = files("experiments.jig").joinpath("element_reference.yaml").read_text(encoding="utf-8")
     return yaml.safe_load(text)
 
 
 def parameters(vacuum: float = 90e3, sealed: bool = False) -> JigParameters:
-    """Return the defaults with a vacuum [Pa] and the reference's limits of the seal."""
+    """Return the default parameters with a vacuum [Pa], vented or perfectly sealed."""
     params = JigParameters()
-    # A bag bridges to a part around its edge: 11.3 cm2 are sucked on under an end of 9.6 cm2.
+    # A bag bridges to a part around its edge: suction acts on 11.3 cm2 under an end of 9.6 cm2.
     strength = FULL_VACUUM * reference()["sealed_area_ratio"]
     perfect = replace(params.suction, strength=strength, lip=0.0, reach=1.0, slip=1.0)
     suction = perfect if sealed else replace(params.suction, enabled=False)
@@ -53,17 +53,17 @@ def punch(
     membrane: bool = True,
     shoulder: bool = False,
 ) -> tuple[Array, Bed]:
-    """Press the flat punch into the soft bed.
+    """Press a flat punch into the soft bed.
 
     Args:
-        depth: Of the punch in the end [m].
+        depth: Final depth of the punch [m].
         speed: Of the punch [m/s].
-        step: [s].
-        membrane: Without it only the beads' weight and the reference's 1 kPa hold the bed.
-        shoulder: Let the bed beside the punch sink as in the reference's dome.
+        step: Time step [s].
+        membrane: False: only the weight of the beads and the surcharge of the reference confine it.
+        shoulder: Let the bed beside the punch sink as in the dome of the reference.
 
     Returns:
-        Depth [m] and pressure [Pa] rows (n, 2), and the bed.
+        Depth [m] and pressure [Pa] per step (n, 2), and the bed.
     """
     params = JigParameters()
     soil = params.soil
@@ -84,13 +84,13 @@ def punch(
 
 
 def residual(bed: Bed, depth: float) -> float:
-    """Return the share of a punch's depth [m] that stays in the bed under its middle."""
+    """Return the fraction of a punch depth [m] that remains as imprint under its middle."""
     floor = float(bed.height_at(np.zeros((1, 2)))[0])
     return (bed.bag.cap_height - floor) / depth
 
 
 def frozen_punch() -> Drag:
-    """Push a cylinder that stands 5 mm deep in the frozen bed down, until it gives way."""
+    """Press a cylinder that stands 5 mm deep in the frozen bed down until the bed fails."""
     rig = held(0.005, FULL_VACUUM, sealed=False)
     return rig.drag(np.array([0.0, 0.0, CYLINDER.length]), -UP, way=0.030, speed=0.05)
 
@@ -98,7 +98,7 @@ def frozen_punch() -> Drag:
 def held(
     depth: float, vacuum: float, sealed: bool, part: Prism = CYLINDER, time_step: float = 1e-3
 ) -> ElementRig:
-    """Return a rig whose part stands in the frozen bed, let go."""
+    """Return a rig whose part is held by the frozen bed alone."""
     rig = ElementRig(parameters(vacuum, sealed), part, time_step=time_step)
     rig.lower_to(depth)
     rig.jam()
@@ -107,24 +107,23 @@ def held(
 
 
 def push(depth: float, vacuum: float = 90e3, sealed: bool = False) -> Drag:
-    """Push the standing cylinder sideways, 40 mm above the apex."""
+    """Push the standing cylinder sideways, `PUSH_HEIGHT` above the apex."""
     rig = held(depth, vacuum, sealed)
     return rig.drag(np.array([0.0, 0.0, PUSH_HEIGHT + depth]), SIDEWAYS, speed=0.02)
 
 
 def pull(depth: float, vacuum: float = 90e3, sealed: bool = False) -> Drag:
-    """Pull the standing cylinder up."""
+    """Pull the standing cylinder out vertically."""
     rig = held(depth, vacuum, sealed)
-    return rig.drag(
-        np.array([0.0, 0.0, CYLINDER.length]), UP, way=0.009, speed=0.02
-    )  # The spring stretches by 50 mm/kN.
+    # The spring stretches by 50 mm/kN.
+    return rig.drag(np.array([0.0, 0.0, CYLINDER.length]), UP, way=0.009, speed=0.02)
 
 
 def lateral_formula(depth: float, vacuum: float, sealed: bool) -> float:
-    """Return the push [N] that overturns the cylinder: (W + p A) b + R d / 2 over the lever.
+    """Return the push [N] that overturns the cylinder: (W + p A) b + R d / 2 over the lever arm.
 
-    R is the passive wall over the part's width and depth (Rankine); b the radius; A what is sucked
-    on in the reference, a little more than the end.
+    R is the passive resistance of the wall over width and depth d of the part (Rankine), b the
+    radius, and A the area under suction in the reference, slightly more than the end face.
     """
     soil, radius = JigParameters().soil, CYLINDER.radius
     wall = Strength.of(soil, vacuum + soil.gravity_pressure).lateral * 2 * radius * depth

@@ -1,4 +1,4 @@
-"""What the element tests press into the bed: regular prisms, and parts of a product."""
+"""Specimens of the element tests: regular prisms, and parts of a product."""
 
 from __future__ import annotations
 
@@ -31,32 +31,32 @@ FRICTION = 0.5
 
 
 class Specimen(Protocol):
-    """A body for the rig."""
+    """A body that the rig presses into the bed."""
 
     def mesh(self) -> trimesh.Trimesh:
-        """Return its surface in the part frame P [m]."""
+        """Return its closed surface in the part frame P [m]."""
         ...
 
     def add_to(self, plant: MultibodyPlant) -> RigidBody:
-        """Add it as a free body; its contacts with the bed are named "bed_*"."""
+        """Add it as a free body with collision geometries named "bed_*"."""
         ...
 
     @property
     def X_CP(self) -> RigidTransform:
-        """Pose in the carriage C, whose origin is under the middle of the part."""
+        """Pose in the carriage C, whose origin is centred below the lowest point of the part."""
         ...
 
 
 @dataclass(frozen=True)
 class Prism:
-    """A regular prism that stands for a round part: axis along z, its low end at z = 0.
+    """A regular prism in place of a round part: axis along z, its lower end at z = 0.
 
     Attributes:
         radius: Mean radius [m].
         length: [m].
         mass: [kg].
-        facets: Around it.
-        lying: Its axis is horizontal, along x.
+        facets: Number of side faces.
+        lying: Held with its axis horizontal, along x.
     """
 
     radius: float = 0.0175
@@ -66,7 +66,7 @@ class Prism:
     lying: bool = False
 
     def mesh(self) -> trimesh.Trimesh:
-        """Return the surface; the corners lie outside so that the mean radius is right."""
+        """Return the surface, its corners outside the round part: the mean radius agrees."""
         angle = np.arange(self.facets) * 2 * np.pi / self.facets
         corner = self.radius * 2 / (1 + np.cos(np.pi / self.facets))
         ring = corner * np.column_stack([np.cos(angle), np.sin(angle)])
@@ -98,11 +98,11 @@ class Prism:
 
 @dataclass(frozen=True, eq=False)
 class ProductPart:
-    """A part of a product, on its own model.
+    """A part of a product, from its model.
 
     Attributes:
         part: With a model.
-        up: Unit axis of P that points up.
+        up: (3,) unit axis of P that points up.
     """
 
     part: Part
@@ -127,7 +127,7 @@ class ProductPart:
 
 
 def _standing(R_CP: RotationMatrix, mesh: trimesh.Trimesh) -> RigidTransform:
-    """Return the pose whose lowest point is at the carriage's origin, in the middle of x and y."""
+    """Return the pose with the lowest point at z = 0 of the carriage, centred in x and y."""
     corners = mesh.vertices @ R_CP.matrix().T
     low, high = corners.min(axis=0), corners.max(axis=0)
     return RigidTransform(R_CP, [-(low[0] + high[0]) / 2, -(low[1] + high[1]) / 2, -low[2]])

@@ -87,7 +87,7 @@ class ArmModel:
 
     @property
     def sdf(self) -> str:
-        """Name of its model in models/sdf."""
+        """Name of its model in models/sdf, or the URL of one elsewhere."""
         return self.name
 
     @property
