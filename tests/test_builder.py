@@ -177,16 +177,6 @@ def test_cell_without_a_tool_of_a_role_says_which_there_are() -> None:
     Simulation(cell).step()
 
 
-def test_two_cells_of_one_name_are_refused() -> None:
-    builder = DiagramBuilder()
-    add_cell(builder, CellConfig(), small_product())
-    with pytest.raises(InputError, match="'plant' in the builder already.*name=...") as error:
-        add_cell(builder, CellConfig(), small_product())
-    assert "\n" not in str(error.value)
-    add_cell(builder, CellConfig(), small_product(), name="other")
-    builder.Build()
-
-
 def test_cell_without_its_diagram_cannot_be_simulated() -> None:
     with pytest.raises(InputError, match="use build_cell, or cell.with_diagram"):
         Simulation(add_cell(DiagramBuilder(), CellConfig(), small_product()))
