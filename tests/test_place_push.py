@@ -43,7 +43,7 @@ def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture)
         (["place", "--set", "jig.bag.cap_height=0.2"], "cap_height"),
         (["place", "--set", "jig.bag.cell=0"], "'jig.bag.cell' must be >= 0.0002"),
         (["place", "--set", "jig.vacuum.jam_fraction=1"], "jam_fraction"),
-        (["place", "--hand", "robot", "--bed", "rigid"], "--bed rigid is for --hand rig"),
+        (["place", "--fixture", "vise"], "No fixture 'vise'. Known: flat_plate, soft_jig."),
         (["push", "--hand", "foot"], "robot"),
         (["regress", "--suite", "huge"], "huge"),
     ],
@@ -75,7 +75,8 @@ def test_diverged_trial_can_be_written() -> None:
 
 def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:
     """The motor on a rigid plate: a verdict with figures, exit code 1, and a whole report."""
-    experiment = Experiment("place", CellConfig(), "rig", "rigid", 1, 0, tmp_path, quiet=True)
+    config = CellConfig.load(overrides={"workcell.fixture": "flat_plate"})
+    experiment = Experiment("place", config, "rig", 1, 0, tmp_path, quiet=True)
     assert run_experiment(experiment, "motor/P2") == 1
     result = json.loads((tmp_path / "result.json").read_text())
     (case,) = result["cases"]

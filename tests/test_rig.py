@@ -1,4 +1,4 @@
-"""The hand on its carriage: kinematics, paths, and one short trial on a rigid block."""
+"""The hand on its carriage: kinematics, paths, and one short trial on a rigid plate."""
 
 import functools
 from dataclasses import replace
@@ -23,7 +23,11 @@ from experiments.paper.trial_metrics import tilt_between
 
 @pytest.fixture(scope="module")
 def motor_rig():
-    return build_push_rig(CellConfig(), load_product("motor_unit"), "motor", "rigid")
+    return build_push_rig(
+        CellConfig.load(overrides={"workcell.fixture": "flat_plate"}),
+        load_product("motor_unit"),
+        "motor",
+    )
 
 
 @functools.cache
@@ -42,7 +46,7 @@ def test_hand_pose_is_recovered_from_its_frame(turn: float, tilt: float) -> None
 def test_carriage_puts_the_hand_where_it_is_told(motor_rig) -> None:
     pose = HandPose(np.array([0.05, 0.1, 0.35]), 0.8, 0.6)
     context = motor_rig.plant.CreateDefaultContext()
-    motor_rig.plant.SetPositions(context, motor_rig.drive.instance, motor_rig.joints(pose))
+    motor_rig.plant.SetPositions(context, motor_rig.carriage, motor_rig.joints(pose))
     tip = motor_rig.plant.GetFrameByName("tip", motor_rig.gripper.instance)
     assert tip.CalcPoseInWorld(context).IsNearlyEqualTo(pose.X_WT, 1e-9)
 
@@ -109,7 +113,7 @@ def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
     X_WP = planned_pose(part, push.posture, X_WJ, apex)
     pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
     seen = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer
-    line = push_line(seen.stage, push, seen.X_WJ, seen.X_WP)
+    line = push_line(seen.stage, seen.root, push, seen.X_WJ, seen.X_WP)
     low = X_WJ.translation()[2] + apex + 0.0063  # The can's rear face: the terminals are 6.3 mm.
     fingers = line.X_WT.translation()[2] - 0.024  # The noses end 24 mm below the tip frame.
     assert fingers == pytest.approx(low + 0.6 * 0.0534, abs=1e-4)
@@ -124,13 +128,14 @@ def test_push_that_cannot_be_started_is_a_verdict(motor_rig) -> None:
     push, X_WJ = PUSHES["motor/P2/a"], motor_rig.config.workcell.X_WJ
     X_WP = planned_pose(motor_rig.part.part, push.posture, X_WJ, 0.0459)
     pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
-    stage = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer.stage
+    seen = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer
+    stage, root = seen.stage, seen.root
     config = replace(stage.config, push=replace(stage.config.push, bed_clearance=0.2))
     with pytest.raises(PhaseFailed, match="without a touch"):
-        push_line(replace(stage, config=config), push, X_WJ, X_WP)
+        push_line(replace(stage, config=config), root, push, X_WJ, X_WP)
     fallen = RotationMatrix.MakeYRotation(np.pi / 2) @ X_WP.rotation()
     with pytest.raises(PhaseFailed, match="lies on the side"):
-        push_line(stage, push, X_WJ, RigidTransform(fallen, X_WP.translation()))
+        push_line(stage, root, push, X_WJ, RigidTransform(fallen, X_WP.translation()))
 
 
 def test_tilt_does_not_see_a_turn_about_the_vertical() -> None:
