@@ -158,6 +158,7 @@ def test_jig_base_rests_on_the_force_plate_bolted_or_free(fixed: str) -> None:
         ("arms.left.tool=hand_x", "No tool 'hand_x'.*'hand_e'.*Known:.*screwdriver"),
         ("arms.left.home_deg=[0,90]", "'home_deg' of an arm has 2 numbers;.*'ur5e' has 6 joints"),
         ("arms.right.stiffness=[1,2,3]", "'stiffness' of an arm has 3 numbers;.*6 joints"),
+        ("arms.left.model=iiwa14", "Arm 'left' cannot wait with joint_1 at 180 deg: .*-170 to 170"),
         ("arms.right.damping=[1]", "'damping' of an arm has 1 numbers;.*6 joints"),
     ],
 )
