@@ -7,12 +7,27 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
+from pydrake.geometry import (
+    AddContactMaterial,
+    AddRigidHydroelasticProperties,
+    ProximityProperties,
+    SceneGraph,
+    Sphere,
+)
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Diagram, DiagramBuilder
+from stories import small_product, stand_on_jig
 
 from cell import Cell, CellConfig, Simulation, add_cell, build_cell, load_product
+from cell.errors import InputError, UnknownName
+from cell.fixtures.base import FixtureError
 from cell.monitor import Monitor
 from cell.simulation.events import receive_part
+from cell.simulation.state import restore_state, save_state
 from cell.workpieces.thread import Engagement, ThreadState
 
 
@@ -133,3 +148,66 @@ def test_jig_base_rests_on_the_force_plate_bolted_or_free(fixed: str) -> None:
     weight = 9.81 * sum(body.get_mass(simulation.context) for body in bodies)
     wrench = cell.force_plate.read(simulation.context)
     np.testing.assert_allclose(wrench[3:], [0.0, 0.0, -weight], atol=0.01 * weight)
+
+
+@pytest.mark.parametrize(
+    ("override", "message"),
+    [
+        ("workcell.fixture=soft_jog", "No fixture 'soft_jog'.*'soft_jig'.*Known:.*flat_plate"),
+        ("arms.left.model=ur6e", "No arm model 'ur6e'.*Did you mean 'ur.*Known:.*iiwa14"),
+        ("arms.left.tool=hand_x", "No tool 'hand_x'.*'hand_e'.*Known:.*screwdriver"),
+        ("arms.left.home_deg=[0,90]", "'home_deg' of an arm has 2 numbers;.*'ur5e' has 6 joints"),
+        ("arms.right.stiffness=[1,2,3]", "'stiffness' of an arm has 3 numbers;.*6 joints"),
+        ("arms.left.model=iiwa14", "Arm 'left' cannot wait with joint_1 at 180 deg: .*-170 to 170"),
+        ("arms.right.damping=[1]", "'damping' of an arm has 1 numbers;.*6 joints"),
+    ],
+)
+def test_devices_that_do_not_exist_are_one_line(override: str, message: str) -> None:
+    with pytest.raises(InputError, match=message) as error:
+        build_cell(CellConfig.load(overrides=[override]), small_product())
+    assert "\n" not in str(error.value)
+
+
+def test_cell_without_a_tool_of_a_role_says_which_there_are() -> None:
+    config = CellConfig.load(overrides=["arms.right.tool=hand_e"])
+    cell = build_cell(config, load_product("motor_unit"))
+    assert [arm.tool.name for arm in cell.arms.values()] == ["left_gripper", "right_gripper"]
+    with pytest.raises(UnknownName, match="No arm with a 'driver'.*Known: gripper"):
+        assert cell.driver
+    assert len(cell.threads) == 0
+    Simulation(cell).step()
+
+
+def test_cell_without_its_diagram_cannot_be_simulated() -> None:
+    with pytest.raises(InputError, match="use build_cell, or cell.with_diagram"):
+        Simulation(add_cell(DiagramBuilder(), CellConfig(), small_product()))
+
+
+def add_ball(plant: MultibodyPlant, _: SceneGraph) -> None:
+    """Add a caller's own body that knows nothing of the jig, in an instance with scopes."""
+    instance = plant.AddModelInstance("mine::deep/ball")
+    body = plant.AddRigidBody("ball", instance, SpatialInertia.SolidSphereWithMass(0.1, 0.02))
+    properties = ProximityProperties()
+    AddRigidHydroelasticProperties(0.01, properties)
+    AddContactMaterial(friction=CoulombFriction(0.5, 0.5), properties=properties)
+    plant.RegisterCollisionGeometry(body, RigidTransform(), Sphere(0.02), "ball", properties)
+
+
+def test_callers_body_meets_the_bag_as_plain_contact() -> None:
+    """The bag cannot conform to it and says so; it still does not fall through."""
+    cell = build_cell(CellConfig(), small_product(), extend=add_ball)
+    simulation = Simulation(cell)
+    ball = cell.plant.GetBodyByName("ball")
+    stand_on_jig(cell, simulation.root, ball, -0.02, -0.001)
+    with pytest.raises(FixtureError, match="'mine::deep/ball::ball' cannot be held.*'bed_...'"):
+        cell.fixture.receive(simulation.root, ball, trimesh.creation.icosphere(radius=0.02))
+    for _ in range(100):
+        simulation.step()
+    X_JB = cell.fixture.pose(simulation.context).InvertAndCompose(
+        cell.plant.EvalBodyPoseInWorld(simulation.context, ball)
+    )
+    assert X_JB.translation()[2] > cell.fixture.entry_height
+    cell.sleeper.put_to_sleep(simulation.root, ball)
+    again = Simulation(cell)
+    restore_state(again, save_state(simulation))
+    assert ball.is_locked(again.context)

@@ -91,6 +91,15 @@ def test_tools_follow_their_ports(cell: Cell) -> None:
     assert cell.driver.tool.drive.commanded_speed(root) == 5.0
 
 
+def test_commands_of_another_size_are_one_line(cell: Cell) -> None:
+    drive, root = cell.holder.drive, told(cell, {}, 0)
+    for q, v in ((5, 6), (5, 7), (7, 7)):
+        with pytest.raises(InputError, match="'left_drive' takes 6 positions and as many"):
+            drive.set_target(root, np.zeros(q), np.zeros(v))
+    with pytest.raises(InputError, match="'left_drive' takes 6 efforts, not 5"):
+        drive.set_effort(root, np.zeros(5))
+
+
 def test_grip_force_is_added_behind_the_opening(cell: Cell) -> None:
     """It moves the target of the driven finger, as the handle's command does."""
     drive = cell.holder.tool.drive

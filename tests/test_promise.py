@@ -29,7 +29,7 @@ from stories import (
 from cell import Cell, add_cell, build_cell
 from cell.errors import InputError
 from cell.fixtures.soft_jig import JigState
-from cell.fixtures.soft_jig.mesh.columns import BadMesh
+from cell.fixtures.soft_jig.mesh.tet_mesh import BadMesh
 from cell.workpieces.thread import ThreadState
 
 PRODUCT = small_product("motor", "plate", "bolt_1")

@@ -2,14 +2,35 @@
 
 from __future__ import annotations
 
+import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from stories import (
+    BOX_STORY,
+    JIG_STEPS,
+    JIG_STORY,
+    QUICK,
+    Story,
+    add_box,
+    assert_same,
+    fix,
+    let_go,
+    play_ours,
+    press_motor,
+    push,
+    sleep,
+    small_product,
+    snapshot,
+    wake,
+)
 
-from cell import Cell, Simulation
+from cell import Cell, CellConfig, Simulation, build_cell
+from cell.errors import InputError
 from cell.simulation.events import receive_part
-from cell.simulation.state import read_state, restore_state, save_state, write_state
+from cell.simulation.state import State, read_state, restore_state, save_state, write_state
 
 STEPS = 50
 
@@ -74,3 +95,149 @@ def test_restoring_brings_back_sleep_and_drive_mode(motor_unit_cell: Cell) -> No
     restore_state(simulation, state)
     assert drive.uses_torque(root)
     assert [part.part.name for part in cell.parts if not part.asleep(root)] == ["plate"]
+
+
+# Asleep in the soft bag, which then jams around it.
+ASLEEP_STORY: Story = {0: press_motor, 200: let_go, 250: sleep, 300: fix, 500: wake}
+
+
+@pytest.fixture(scope="module")
+def small_cell() -> Cell:
+    return build_cell(QUICK, small_product("motor"))
+
+
+def go_on(cell: Cell, simulation: Simulation, story: Story, steps: int) -> None:
+    for step in range(simulation.steps, steps):
+        if step in story:
+            story[step](cell, simulation.root)
+        simulation.step()
+
+
+@pytest.mark.parametrize(
+    ("story", "steps", "moments"),
+    [(JIG_STORY, JIG_STEPS, (348, 420, 470)), (ASLEEP_STORY, 600, (270,))],
+)
+def test_jig_and_sleepers_continue_bit_for_bit(
+    small_cell: Cell, story: Story, steps: int, moments: tuple[int, ...]
+) -> None:
+    """While pressing, a step before jamming, jammed, asleep, vented: force plate and all."""
+    simulation, states = Simulation(small_cell), {}
+    for moment in moments:
+        go_on(small_cell, simulation, story, moment)
+        states[moment] = save_state(simulation)
+    go_on(small_cell, simulation, story, steps)
+    expected = snapshot(small_cell, simulation.root)
+    for moment, state in states.items():
+        fresh = Simulation(small_cell)
+        restore_state(fresh, state)
+        pushing = moment < min(k for k, command in story.items() if command is let_go)
+        push(small_cell, fresh.root, small_cell.parts["motor"].body, 20.0 if pushing else 0.0)
+        go_on(small_cell, fresh, story, steps)
+        assert_same(snapshot(small_cell, fresh.root), expected)
+
+
+def test_load_of_a_part_that_falls_asleep_right_after_a_restore(small_cell: Cell) -> None:
+    """Drake has no contact then to read it from: the state has."""
+    story = {k: command for k, command in JIG_STORY.items() if k < 450}
+    simulation = play_ours(small_cell, story, 470)
+    state = save_state(simulation)
+    fresh = Simulation(small_cell)
+    restore_state(fresh, state)
+    for each in (simulation, fresh):
+        sleep(small_cell, each.root)
+        each.step()
+    assert_same(snapshot(small_cell, fresh.root), snapshot(small_cell, simulation.root))
+    load = small_cell.force_plate.read(fresh.context)[5]
+    assert load < -60.0  # 59.35 N without the motor.
+
+
+def test_state_goes_over_to_another_build_of_the_same_cell(small_cell: Cell) -> None:
+    """With a caller's own body, asleep on the jig when the state was saved."""
+    one, other = (build_cell(QUICK, small_product("motor"), extend=add_box) for _ in range(2))
+    simulation = play_ours(one, BOX_STORY, 470)
+    state = save_state(simulation)
+    fresh = Simulation(other)
+    restore_state(fresh, state)
+    assert other.plant.GetBodyByName("box").is_locked(fresh.context)
+    push(other, fresh.root, other.parts["motor"].body, 0.0)
+    for cell, each in ((one, simulation), (other, fresh)):
+        go_on(cell, each, BOX_STORY, 560)
+    assert_same(snapshot(other, fresh.root), snapshot(one, simulation.root))
+
+
+def refused(cell: Cell, state: State) -> str:
+    """Return the one line with which a state is refused."""
+    with pytest.raises(InputError) as error:
+        restore_state(Simulation(cell), state)
+    assert "\n" not in str(error.value)
+    return str(error.value)
+
+
+def test_state_of_something_else_is_refused(small_cell: Cell) -> None:
+    state = save_state(Simulation(small_cell))
+    product = small_cell.product
+    heavier = replace(product.parts["motor"], mass=0.2)
+    for config, other, message in (
+        (QUICK, small_product("plate"), "another product: motor_unit .*, not motor_unit "),
+        (QUICK, replace(product, parts={"motor": heavier}), "another product"),
+        (CellConfig(), product, "another configuration"),
+    ):
+        assert re.search(message, refused(build_cell(config, other), state))
+    line = refused(small_cell, state | {"of/Drake": np.array("1.2.3")})
+    assert line.startswith("The saved state is of another Drake: 1.2.3, not ")
+    assert "another product: unknown" in refused(small_cell, {})
+
+
+def test_every_missing_array_is_noticed(small_cell: Cell) -> None:
+    state = save_state(play_ours(small_cell, {0: press_motor}, 20))
+    for name in state:
+        optional = name.startswith(("fixture/bed/", "fixture/pressing")) and name.count("/") > 2
+        if not name.startswith("of/") and not optional:
+            rest = {other: value for other, value in state.items() if other != name}
+            line = refused(small_cell, rest)
+            assert "The saved state lacks '" in line or "lacks the load of" in line, name
+
+
+@pytest.mark.parametrize(
+    ("name", "value", "message"),
+    [
+        ("q", np.zeros(3), r"'q' has shape \(3,\), not"),
+        ("v", None, "'v' is not finite"),
+        ("steps", np.zeros(3), "'steps' has shape"),
+        ("drive/left", np.zeros(2), "'drive/left' has shape"),
+        ("fixture/state", np.array("molten"), "'molten' is not a valid JigState"),
+        ("fixture/bed/heights", np.zeros(3), "damaged"),
+        ("q/deeper", np.zeros(3), "damaged"),
+    ],
+)
+def test_damaged_state_is_refused(
+    small_cell: Cell, name: str, value: np.ndarray | None, message: str
+) -> None:
+    state = save_state(Simulation(small_cell))
+    value = state[name] * np.nan if value is None else value
+    with pytest.raises(InputError, match=message):
+        restore_state(Simulation(small_cell), state | {name: value})
+
+
+def test_file_that_is_no_state_is_refused(small_cell: Cell, tmp_path: Path) -> None:
+    whole = tmp_path / "whole.npz"
+    write_state(whole, save_state(Simulation(small_cell)))
+    content = whole.read_bytes()
+    half = len(content) // 2
+    flipped = bytes(byte ^ 0xFF for byte in content[half : half + 8])
+    for name, text in (
+        ("nonsense", b"nonsense"),
+        ("empty", b""),
+        ("half", content[:half]),
+        ("flipped", content[:half] + flipped + content[half + 8 :]),
+    ):
+        path = tmp_path / f"{name}.npz"
+        path.write_bytes(text)
+        with pytest.raises(InputError, match=f"{name}.npz' is not a saved state"):
+            read_state(path)
+    np.save(tmp_path / "array.npy", np.zeros(3))
+    for path in (tmp_path / "array.npy", tmp_path):
+        with pytest.raises(InputError, match="is not a saved state"):
+            read_state(path)
+    with pytest.raises(InputError, match="There is no saved state"):
+        read_state(tmp_path / "nowhere.npz")

@@ -9,6 +9,7 @@ import pytest
 from pydrake.math import RigidTransform, RotationMatrix
 from thread_rig import BOLT, ThreadRig
 
+from cell.errors import UnknownName
 from cell.workpieces.thread import (
     BIT_GATE,
     ENGAGED_MASS_FACTOR,
@@ -62,7 +63,7 @@ def mass(rig: ThreadRig) -> float:
 
 
 def engagement(rig: ThreadRig) -> Engagement:
-    return rig.threads.engagements(rig.root)[BOLT]
+    return rig.threads.engagement(rig.root, BOLT)
 
 
 def engage_bit(rig: ThreadRig) -> Misfit:
@@ -272,6 +273,15 @@ def test_sleeping_bolt_is_not_engaged() -> None:
     rig.put_bit(rig.seated_bit)
     turn_at_once(rig)
     assert engagement(rig) == Engagement()
+
+
+def test_unknown_bolt_is_named_with_the_known_ones() -> None:
+    rig = ThreadRig()
+    for ask in (rig.threads.state, rig.threads.bit_engaged, rig.threads.turns):
+        with pytest.raises(UnknownName, match="No bolt 'bolt_9'.*Known: bolt_1"):
+            ask(rig.root, "bolt_9")
+    with pytest.raises(UnknownName):
+        rig.threads.set(rig.root, "bolt_9", Engagement())
 
 
 @pytest.mark.parametrize("error", ["axial", "lateral", "tilt", "angle"])

@@ -191,6 +191,9 @@ def add_arm(
         drive: From `arm_drive`.
         tool_model: Name of the SDF model of the tool; its frame ``mount`` meets the flange.
         add_tool: Makes the handle of the tool from its model instance.
+
+    Raises:
+        InputError: It would wait beyond the range of a joint, which would throw it back.
     """
     parser = new_parser(plant)
     (instance,) = parser.AddModelsFromUrl(model_url(model.sdf))
@@ -220,5 +223,13 @@ def add_arm(
         drive=drive,
     )
     for joint, angle in zip(joints, arm.home, strict=True):
+        low, high = joint.position_lower_limits()[0], joint.position_upper_limits()[0]
+        if not low <= angle <= high:
+            low, high, angle = np.rad2deg([low, high, angle]).round(1)
+            raise InputError(
+                f"Arm '{name}' cannot wait with {joint.name()} at {angle:g} deg: arm model "
+                f"'{model.name}' reaches from {low:g} to {high:g} deg "
+                f"(arms.{name}.home_deg, arms.{name}.home_pan_deg)."
+            )
         joint.set_default_angle(angle)
     return arm

@@ -24,6 +24,8 @@ from pydrake.systems.framework import (
     OutputPort,
 )
 
+from cell.errors import InputError
+
 NamedPorts = tuple[dict[str, InputPort], dict[str, OutputPort]]  # Inputs and outputs by name.
 
 
@@ -55,12 +57,27 @@ class JointDrive(LeafSystem):
         builder.Connect(actuation, plant.get_actuation_input_port(instance))
 
     def set_target(self, root: Context, q: np.ndarray, v: np.ndarray) -> None:
-        """Command desired positions and velocities (n,) of the joints."""
+        """Command desired positions and velocities (n,) of the joints.
+
+        Raises:
+            InputError: Another number of them.
+        """
+        if len(q) != self.size or len(v) != self.size:
+            raise InputError(
+                f"'{self.get_name()}' takes {self.size} positions and as many velocities, "
+                f"not {len(q)} and {len(v)}."
+            )
         context = self.GetMyMutableContextFromRoot(root)
         context.SetDiscreteState(self._target, np.concatenate([q, v]))
 
     def set_effort(self, root: Context, effort: np.ndarray) -> None:
-        """Command the feed-forward effort (n,) of the joints."""
+        """Command the feed-forward effort (n,) of the joints.
+
+        Raises:
+            InputError: Another number of them.
+        """
+        if len(effort) != self.size:
+            raise InputError(f"'{self.get_name()}' takes {self.size} efforts, not {len(effort)}.")
         self.GetMyMutableContextFromRoot(root).SetDiscreteState(self._effort, effort)
 
     def desired(self, context: Context) -> np.ndarray:

@@ -56,8 +56,8 @@ def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> No
             one.
     """
     _check_identity(simulation, state)
-    _check_complete(simulation, state)
     try:
+        _check_complete(simulation, state)
         _restore(simulation, _nested(state))
     except KeyError as missing:
         raise InputError(f"The saved state lacks {missing}: it is incomplete.") from missing

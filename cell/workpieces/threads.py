@@ -69,19 +69,27 @@ class Threads(LeafSystem):
         state = self.GetMyContextFromRoot(root).get_discrete_state(self._index)
         return state.value().reshape(-1, 3).copy()
 
+    def engagement(self, root: Context, bolt: str) -> Engagement:
+        """Return what is remembered of one thread.
+
+        Raises:
+            UnknownName: No such bolt; so do all readings and commands by name.
+        """
+        return self.engagements(root)[self[bolt].screw.part]
+
     def state(self, root: Context, bolt: str) -> ThreadState:
         """Return the state of one thread."""
-        return self.engagements(root)[bolt].state
+        return self.engagement(root, bolt).state
 
     def bit_engaged(self, root: Context, bolt: str) -> bool:
         """Return whether the bit is in the socket of a bolt."""
-        return self.engagements(root)[bolt].bit_position != NO_BIT
+        return self.engagement(root, bolt).bit_position != NO_BIT
 
     def turns(self, root: Context, bolt: str) -> float:
         """Return the turns of a bolt since its thread caught, positive for tightening."""
-        thread = self._threads[bolt]
+        thread = self[bolt]
         angle = thread.joint.get_rotation(thread.plant.GetMyContextFromRoot(root))
-        return (self.engagements(root)[bolt].caught_angle - angle) / (2 * np.pi)
+        return (self.engagement(root, bolt).caught_angle - angle) / (2 * np.pi)
 
     # Simulation.
 
@@ -92,7 +100,7 @@ class Threads(LeafSystem):
 
     def set(self, root: Context, bolt: str, engagement: Engagement) -> None:
         """Put one thread into a state; the positions are left as they are."""
-        self._threads[bolt].apply(root, engagement)
+        self[bolt].apply(root, engagement)
         self._remember(root, bolt, engagement)
 
     def step(self, root: Context, dt: float) -> None:
