@@ -85,15 +85,15 @@ class _Album:
         problem = rendering_problem()
         self.notes = [] if problem is None else [f"No pictures: {problem}."]
 
-    def take(self, case: Case, event: str, seen: Observer) -> None:
+    def take(self, case: Case, event: str, observer: Observer) -> None:
         """Take the picture of an event, for the end only if the trial stopped early."""
         last = self.pictures[-1][0] if self.pictures else ""
         ended_early = event == "end" and last != f"{case.label}: after"
         if self.notes or event not in self.wanted or (event == "end" and not ended_early):
             return
-        view = view_of(seen.stage.config.workcell.X_WJ)
+        view = view_of(observer.stage.config.workcell.X_WJ)
         caption = f"{case.label}: {event}"
-        scene = take_picture(seen.stage.scene_graph, seen.root, view)
+        scene = take_picture(observer.stage.scene_graph, observer.root, view)
         self.pictures.append((caption, scene))
 
 

@@ -198,21 +198,21 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
         push: The push; None only places the part.
         watch: Called at the events "placed", "before", "after" and "end".
     """
-    trial, seen = TrialRecord(planned=hand.planned), hand.observer
+    trial, observer = TrialRecord(planned=hand.planned), hand.observer
     try:
         hand.press()
-        trial.planned, trial.held = hand.planned, seen.X_JP
+        trial.planned, trial.held = hand.planned, observer.X_JP
         hand.let_go()
         hand.wait("settle", SETTLE_TIME if push is None else REST_TIME)
-        trial.placed, trial.speed = seen.X_JP, seen.speed
-        watch("placed", seen)
+        trial.placed, trial.speed = observer.X_JP, observer.speed
+        watch("placed", observer)
         if push is not None:
             _push(hand, push, trial, watch)
     except PhaseFailed as error:
         trial.failure = (error.phase, error.evidence)
-    watch("end", seen)
-    trial.moved, trial.last_jig = seen.X_JP, seen.X_WJ
-    trial.log = seen.log.arrays()
+    watch("end", observer)
+    trial.moved, trial.last_jig = observer.X_JP, observer.X_WJ
+    trial.log = observer.log.arrays()
     clock = hand.simulation
     trial.sim_seconds, trial.cpu_seconds = clock.time, clock.stepping_cpu
     return trial
@@ -220,14 +220,14 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
 
 def _push(hand: Hand, push: PushSpec, trial: TrialRecord, watch: Watch) -> None:
     """Move the closed hand to the start of the push, push, and let the jig coast."""
-    seen = hand.observer
-    line = push_line(seen.stage, seen.root, push, seen.X_WJ, seen.X_WP)
+    observer = hand.observer
+    line = push_line(observer.stage, observer.root, push, observer.X_WJ, observer.X_WP)
     hand.approach(line)
     hand.wait("ready", READY_TIME)
-    seen.tare_hand()  # In free air: at the start of the trial a jaw may have touched the part.
-    trial.before = seen.X_WJ
-    watch("before", seen)
+    observer.tare_hand()  # In free air: at the start of the trial a jaw may have touched the part.
+    trial.before = observer.X_WJ
+    watch("before", observer)
     hand.push(line)
     hand.wait("coast", COAST_TIME)
-    trial.after = seen.X_WJ
-    watch("after", seen)
+    trial.after = observer.X_WJ
+    watch("after", observer)
