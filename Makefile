@@ -5,7 +5,7 @@ BIN := $(VENV)/bin
 INSTALLED := $(VENV)/installed
 ARGS ?=
 
-.PHONY: help setup find-python system run test test-slow regress check format models clean
+.PHONY: help setup find-python system run test test-slow regress check docs format models clean
 
 help:
 	@echo "make setup      environment from the lock file, and what rendering needs of the system"
@@ -14,7 +14,8 @@ help:
 	@echo "make test       set up, then run the fast tests"
 	@echo "make test-slow  long simulations"
 	@echo "make regress    the paper's experiments, quick suite, against stored metrics"
-	@echo "make check      style, types"
+	@echo "make check      style, types, documentation"
+	@echo "make docs       the documentation as pages, in out/site"
 	@echo "make format     rewrite the sources in the project's style"
 	@echo "make models     write the generated models again"
 	@echo "make clean      remove the environment and everything generated outside models/"
@@ -36,10 +37,14 @@ test-slow: $(INSTALLED)
 regress: $(INSTALLED)
 	$(BIN)/soft-jig regress --out out/regress $(ARGS)
 
-check: $(INSTALLED)
+check: $(INSTALLED) docs
 	$(BIN)/ruff check .
 	$(BIN)/ruff format --check .
 	$(BIN)/pyright
+
+# Nothing is fetched; a broken link or reference is an error. The variable silences an announcement.
+docs: $(INSTALLED)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --quiet --strict
 
 format: $(INSTALLED)
 	$(BIN)/ruff check --fix .

@@ -62,6 +62,8 @@ if TYPE_CHECKING:
     from cell.simulation.state import read_state, restore_state, save_state, write_state
     from cell.workpieces.thread import ThreadState
 
+    __version__: str
+
 __all__ = [
     "ARM_MODELS",
     "Arm",

@@ -23,6 +23,7 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlan
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context, LeafSystem
 
+from cell.bodies import body_of, full_name
 from cell.forces import applied_force, forces_from_rows, forces_to_rows, no_forces
 
 Forces = list[ExternallyAppliedSpatialForce]
@@ -93,7 +94,7 @@ class Sleep(LeafSystem):
         context = self._plant.GetMyMutableContextFromRoot(root)
         if not body.is_locked(context):
             loads = self._load_of(root, body)
-            self._changed(root).loads[body.scoped_name().get_full()] = loads
+            self._changed(root).loads[full_name(body)] = loads
             self._plant.SetFreeBodySpatialVelocity(context, body, SpatialVelocity.Zero())
             self._joints[int(body.index())].Lock(context)
             self._set_contact(root, body, apart_from, active=False)
@@ -102,7 +103,7 @@ class Sleep(LeafSystem):
         """Let a body move again, from rest; arguments as of `put_to_sleep`."""
         context = self._plant.GetMyMutableContextFromRoot(root)
         if body.is_locked(context):
-            self._changed(root).loads.pop(body.scoped_name().get_full(), None)
+            self._changed(root).loads.pop(full_name(body), None)
             self._set_contact(root, body, apart_from, active=True)
             self._joints[int(body.index())].Unlock(context)
 
@@ -124,7 +125,7 @@ class Sleep(LeafSystem):
 
     def _load_of(self, root: Context, body: RigidBody) -> Forces:
         """Return the forces that a body exerted on the bearers in the latest step."""
-        memory, name = self.memory(root), body.scoped_name().get_full()
+        memory, name = self.memory(root), full_name(body)
         if root.get_time() == memory.restored_at:
             return memory.latest.get(name, [])
         return list(self._contact_forces(root, body))
@@ -150,27 +151,41 @@ class Sleep(LeafSystem):
 
     # Saving.
 
+    def wake_all(self, root: Context) -> None:
+        """Wake every body that sleeps apart from all others; callers' own bodies among them."""
+        for name in list(self.memory(root).loads):
+            self.wake(root, body_of(self._plant, name))
+
     def save(self, root: Context, bodies: Sequence[RigidBody]) -> dict[str, Any]:
-        """Return the loads of sleeping bodies, and those of the others in the latest step."""
-        loads = self.memory(root).loads
+        """Return the loads of sleeping bodies, and those of the others in the latest step.
+
+        Args:
+            root: Context of the diagram.
+            bodies: Of the cell; a caller's own are saved while they sleep.
+        """
+        names = {full_name(body): body for body in bodies}
         context = self._plant.GetMyContextFromRoot(root)
-        awake = [body for body in bodies if not body.is_locked(context)]
+        asleep = {name: [] for name, body in names.items() if body.is_locked(context)}
+        loads = asleep | self.memory(root).loads
         return {
             "loads": {name: forces_to_rows(forces) for name, forces in loads.items()},
             "latest": {
-                body.scoped_name().get_full(): forces_to_rows(self._load_of(root, body))
-                for body in awake
+                name: forces_to_rows(self._load_of(root, body))
+                for name, body in names.items()
+                if name not in loads
             },
         }
 
     def restore(self, root: Context, state: Mapping[str, Any], time: float) -> None:
-        """Return to saved loads; which bodies sleep is restored by locking them.
+        """Return to saved loads; bodies that slept and are awake now fall asleep.
 
         Args:
             root: Context of the diagram.
             state: As `save` returned it.
             time: At which it was saved [s].
         """
+        for name in state.get("loads", {}):
+            self.put_to_sleep(root, body_of(self._plant, name))
         memory = self._changed(root)
         memory.restored_at = time
         for kept, name in ((memory.loads, "loads"), (memory.latest, "latest")):

@@ -1,6 +1,6 @@
 """Run, measure, report. Each file in this folder is a script: ``python -m experiments.NAME``.
 
-The folders are the rooms that the scripts share, from the lowest up:
+The folders are what the scripts share, from the lowest up:
 
 - `reporting`: files, pages, plots, pictures.
 - `metrics`: what an assembly is judged by.

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 
 import numpy as np
@@ -12,17 +11,16 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import QuaternionFloatingJoint
 
-from cell.configuration.config import ArmConfig
-from cell.machines.arm import Arm, add_arm
+from cell.configuration.config import ArmConfig, CellConfig
+from cell.machines.arm import Arm
 from cell.machines.arms import ArmModel
 from cell.machines.arms.ur import UR5E
+from cell.machines.devices import add_arms, make_drives
 from cell.paths import model_url, new_parser
 from planning.motion.collision_model import CollisionModel
 
 P_WJ = [0.0, 0.15, 0.20]
 TOOL_DOWN = RollPitchYaw(np.pi, 0.0, 0.0)
-LEFT = ArmConfig(p_WB=(-0.55, 0.0, 0.0))
-RIGHT = ArmConfig(p_WB=(0.55, 0.0, 0.0))
 
 
 def populate(
@@ -33,16 +31,14 @@ def populate(
         X_WM = RigidTransform() if name == "table" else X_WJ
         (instance,) = new_parser(plant).AddModelsFromUrl(model_url(name))
         plant.WeldFrames(plant.world_frame(), plant.GetFrameByName(name, instance), X_WM)
-    left = replace(
-        LEFT,
-        home_deg=model.home_deg["gripper"],
-        stiffness=model.stiffness,
-        damping=model.damping,
+    left = ArmConfig(
+        model.name, gripper, p_WB=(-0.55, 0.0, 0.0), home_deg=model.home_deg["gripper"]
     )
-    arms = {
-        "left": add_arm(plant, "left", gripper, left, model),
-        "right": add_arm(plant, "right", "screwdriver", RIGHT),
-    }
+    right = ArmConfig(
+        "ur5e", "screwdriver", p_WB=(0.55, 0.0, 0.0), home_deg=UR5E.home_deg["gripper"]
+    )
+    config = CellConfig(arms={"left": left, "right": right})
+    arms = add_arms(plant, config, make_drives(config))
     for name in ("motor", "motor_plate"):
         (instance,) = new_parser(plant).AddModelsFromUrl(model_url(name))
         body = plant.get_body(plant.GetBodyIndices(instance)[0])

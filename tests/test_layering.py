@@ -14,6 +14,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
     "cell": {
         "errors": set(),
         "paths": set(),
+        "bodies": set(),
         "setting": set(),
         "forces": set(),
         "sleep": set(),
@@ -51,7 +52,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
     },
 }  # fmt: skip
 EVERYWHERE = {
-    "cell": {"errors", "paths", "setting", "forces", "sleep"},
+    "cell": {"bodies", "errors", "paths", "setting", "forces", "sleep"},
     "planning": set(),
     "experiments": set(),
 }

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterable
+from functools import cached_property
 
 import numpy as np
 from pydrake.systems.analysis import Simulator
@@ -14,6 +15,7 @@ from cell.errors import InputError, UnknownName
 from cell.machines.arm import Arm
 from cell.machines.driver import Driver
 from cell.machines.gripper import Gripper
+from cell.simulation.identity import identity_of
 from cell.simulation.log import Log
 from cell.simulation.phase import (
     ArmCommand,
@@ -81,6 +83,11 @@ class Simulation:
     def time(self) -> float:
         """Simulated time [s]."""
         return self.steps * self.time_step
+
+    @cached_property
+    def identity(self) -> dict[str, str]:
+        """What a saved state of this run holds for."""
+        return identity_of(self.cell)
 
     def step(self) -> None:
         """Advance by one time step of the plant."""

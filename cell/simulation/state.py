@@ -1,26 +1,26 @@
 """Save and restore all state of a run: continuing from a restored state is bit-identical.
 
 A saved state is a flat mapping of names to arrays. It also says what it is of: product,
-configuration and Drake's version; a state of another cell is refused.
+configuration, bodies and Drake's version; a state of another cell is refused.
 """
 
 from __future__ import annotations
 
-import hashlib
-import json
+import zlib
 from collections.abc import Mapping
-from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 from zipfile import BadZipFile
 
 import numpy as np
 
-from cell.builder import Cell
+from cell.bodies import full_name
 from cell.errors import InputError
 from cell.simulation.simulation import Simulation
 
 State = dict[str, np.ndarray]
+
+SLASH = "%2F"  # A slash in the name of a part or body, in the path of an array.
 
 
 def save_state(simulation: Simulation) -> State:
@@ -29,7 +29,7 @@ def save_state(simulation: Simulation) -> State:
     bodies = [part.body for part in cell.parts]
     asleep = {part.part.name: np.array(part.asleep(root)) for part in cell.parts}
     state: dict[str, Any] = {
-        "of": {name: np.array(value) for name, value in _identity(cell).items()},
+        "of": {name: np.array(value) for name, value in simulation.identity.items()},
         "steps": np.array(simulation.steps),
         "q": cell.plant.GetPositions(context).copy(),
         "v": cell.plant.GetVelocities(context).copy(),
@@ -48,22 +48,30 @@ def save_state(simulation: Simulation) -> State:
 def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
     """Put a simulation of the same cell into a saved state.
 
+    Drake derives what the force plate and the outputs of the plant read from a step: they are those
+    of the saved run again after the next one.
+
     Raises:
-        InputError: A state of another product, configuration or Drake, or an incomplete one.
+        InputError: A state of another product, configuration or Drake, or an incomplete or damaged
+            one.
     """
-    nested = _nested(state)
-    _check_identity(simulation.cell, nested.get("of", {}))
+    _check_identity(simulation, state)
+    _check_complete(simulation, state)
     try:
-        _restore(simulation, nested)
+        _restore(simulation, _nested(state))
     except KeyError as missing:
         raise InputError(f"The saved state lacks {missing}: it is incomplete.") from missing
+    except (AttributeError, IndexError, RuntimeError, TypeError, ValueError) as error:
+        reason = str(error).splitlines()[0]
+        raise InputError(f"The saved state is damaged: {reason}.") from error
 
 
 def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     cell, root, context = simulation.cell, simulation.root, simulation.context
     # Sleep is restored in the end; what was asleep before must not keep its locks and filters.
-    cell.parts.sleep_all_but(root, [part.part.name for part in cell.parts])
+    cell.parts.sleep_all_but(root, cell.parts.by_name)
     cell.jig_base.wake(root)
+    cell.sleeper.wake_all(root)
     cell.threads.restore(root, state["threads"])
     cell.fixture.restore(root, state.get("fixture", {}))
     for part in cell.parts:
@@ -76,7 +84,7 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     simulation.wrists = {name: reading.copy() for name, reading in state["wrist"].items()}
     simulation.tare = {name: reading.copy() for name, reading in state["tare"].items()}
     simulation.steps = int(state["steps"])
-    cell.sleeper.restore(root, state.get("sleep", {}), simulation.time)
+    cell.sleeper.restore(root, state["sleep"], simulation.time)
     root.SetTime(simulation.time)
     cell.monitor.counter.set_seen(root, simulation.steps)
     cell.plant.SetPositions(context, state["q"])
@@ -84,28 +92,40 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     simulation.simulator.Initialize()
 
 
-def _identity(cell: Cell) -> dict[str, str]:
-    """Return what a saved state holds for: product, configuration, Drake's version."""
-    text = json.dumps(cell.config.to_dict(), sort_keys=True, default=str)
-    return {
-        "product": cell.product.name,
-        "configuration": hashlib.sha256(text.encode()).hexdigest()[:16],
-        "Drake": version("drake"),
-    }
-
-
-def _check_identity(cell: Cell, saved: Mapping[str, Any]) -> None:
-    for what, now in _identity(cell).items():
-        then = str(saved.get(what, "unknown"))
+def _check_identity(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
+    for what, now in simulation.identity.items():
+        then = str(state.get(f"of/{what}", "unknown"))
         if then != now:
             raise InputError(f"The saved state is of another {what}: {then}, not {now}.")
+
+
+def _check_complete(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
+    """Check names, shapes and numbers against those of the present state, before it is changed."""
+    for name, value in save_state(simulation).items():
+        if name.startswith(("fixture/", "sleep/")):
+            continue  # They depend on what is under way.
+        if name not in state:
+            raise InputError(f"The saved state lacks '{name}': it is incomplete.")
+        if state[name].shape != value.shape:
+            raise InputError(
+                f"The saved state is damaged: '{name}' has shape {state[name].shape}, "
+                f"not {value.shape}."
+            )
+        if value.dtype.kind == "f" and not np.isfinite(state[name]).all():
+            raise InputError(f"The saved state is damaged: '{name}' is not finite.")
+    cell, nested = simulation.cell, _nested(state)
+    bodies = {part.part.name: part.body for part in cell.parts} | {"jig_base": cell.jig_base.body}
+    for name, body in bodies.items():
+        kind = "loads" if nested["asleep"][name] else "latest"
+        if full_name(body) not in nested.get("sleep", {}).get(kind, {}):
+            raise InputError(f"The saved state lacks the load of '{name}': it is incomplete.")
 
 
 def _flat(nested: Mapping[str, Any], prefix: str = "") -> State:
     """Return nested dictionaries as one, with paths for names."""
     flat: State = {}
     for name, value in nested.items():
-        path = f"{prefix}{name}"
+        path = prefix + name.replace("/", SLASH)
         if isinstance(value, Mapping):
             flat.update(_flat(value, f"{path}/"))
         else:
@@ -120,8 +140,8 @@ def _nested(flat: Mapping[str, np.ndarray]) -> dict[str, Any]:
         *folders, name = path.split("/")
         here = nested
         for folder in folders:
-            here = here.setdefault(folder, {})
-        here[name] = value
+            here = here.setdefault(folder.replace(SLASH, "/"), {})
+        here[name.replace(SLASH, "/")] = value
     return nested
 
 
@@ -141,5 +161,5 @@ def read_state(path: Path) -> State:
             return {name: archive[name] for name in archive.files}
     except FileNotFoundError:
         raise InputError(f"There is no saved state '{path}'.") from None
-    except (OSError, ValueError, BadZipFile) as error:
-        raise InputError(f"'{path}' is not a saved state: {error}.") from error
+    except (OSError, TypeError, ValueError, EOFError, BadZipFile, zlib.error) as error:
+        raise InputError(f"'{path}' is not a saved state, or it is damaged.") from error

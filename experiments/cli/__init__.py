@@ -1,4 +1,4 @@
 """The command line: ``soft-jig``, its commands, and their options as typed classes.
 
-Options are checked here; the work is done in the other rooms, imported when a command runs.
+Options are checked here; the work is done in the other folders, imported when a command runs.
 """
