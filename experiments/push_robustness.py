@@ -1,16 +1,17 @@
-"""How robust the push outcomes are: to thirteen free numbers, and to how they are computed.
+"""Robustness of the push outcomes, to thirteen free parameters and to the numerics.
 
     python -m experiments.push_robustness --samples 20 --workers 2 --out out/robustness
     python -m experiments.push_robustness --samples 0 --one-by-one
     python -m experiments.push_robustness --samples 10 --spread 0.3 --case plate/P1
     python -m experiments.push_robustness --samples 0 --numerics --controls
 
-What the paper does not give is set once, for all cases and both parts, in the configuration's
-section ``push`` and in ``placement`` and ``jig``. One of these numbers follows from a measured one:
-the mean displacement of the paper's successes, 78.2 mm. A jig that follows the hand until it stops
-dead coasts on by v^2 / (2 mu g), so that v = sqrt(2 mu g (78.2 mm - stroke + gap)).
+Parameters that the paper does not give are set once, for all cases and both parts, in the sections
+``push``, ``placement`` and ``jig`` of the configuration. One follows from a measured number, the
+mean displacement of the paper's successes, 78.2 mm: a jig that follows the hand until its abrupt
+stop coasts on by v^2 / (2 mu g), so that v = sqrt(2 mu g (78.2 mm - stroke + gap)).
 
-Every variant is one trial of each case with the same disturbance, so that only the variant differs.
+Every variant runs one trial of each case with the same disturbance, so that only the variant
+differs.
 """
 
 from __future__ import annotations
@@ -32,7 +33,7 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.configuration.config import CellConfig
 from cell.configuration.sections import entries
-from cell.errors import CellError
+from cell.errors import CellError, InputError
 from cell.products.loading import load_product
 from experiments.cli.common import BadUsage, Common
 from experiments.paper.case_plots import PAPER_MEANS
@@ -41,7 +42,7 @@ from experiments.paper.place_push import cases_of
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import versions
 
-# Paths in the configuration; the plausible range of each stands in its source.
+# Paths in the configuration; the source of each setting states its plausible range.
 PARAMETERS = (
     "push.jig_mass",
     "push.base_friction",
@@ -74,14 +75,14 @@ Changes = Mapping[str, Any]  # Path in the configuration -> value.
 
 
 @dataclass(frozen=True)
-class Options:
-    """What to run."""
+class RobustnessOptions:
+    """Options of the script."""
 
     samples: int = 20
-    """Joint samples, all parameters drawn at once."""
+    """Number of joint samples, with all parameters drawn at once."""
 
     spread: float = 0.10
-    """Share by which every parameter may differ."""
+    """Largest relative change of a parameter."""
 
     case: Annotated[str | None, arg(metavar="motor/P2/a")] = None
     """A case, or a part or posture for all of its cases. Default: all nine."""
@@ -103,11 +104,11 @@ class Options:
 
 @dataclass(frozen=True)
 class Variant:
-    """One set of numbers.
+    """One variant of the configuration.
 
     Attributes:
         name: For the table.
-        changes: What differs from the configuration.
+        changes: Values by path that differ from the configuration.
     """
 
     name: str
@@ -123,7 +124,7 @@ def value_at(config: CellConfig, path: str) -> float:
 
 
 def scaled(config: CellConfig, factors: Mapping[str, float]) -> Changes:
-    """Return the numbers of the configuration at some paths, multiplied as far as is valid."""
+    """Return numbers of the configuration multiplied by factors, clipped to their valid range."""
     infos = {entry.path: entry.info for entry in entries(config)}
     return {
         path: infos[path].nearest(value_at(config, path) * factor)
@@ -132,14 +133,14 @@ def scaled(config: CellConfig, factors: Mapping[str, float]) -> Changes:
 
 
 def coasting_speed(config: CellConfig) -> float:
-    """Return the push speed that takes the jig as far as the paper's mean success [m/s]."""
+    """Return the push speed that displaces the jig by the mean of the paper's successes [m/s]."""
     push = config.push
     coast = PAPER_MEANS["success"] - push.stroke + push.start_gap
     return float(np.sqrt(2 * push.base_friction * GRAVITY * coast))
 
 
-def variants(options: Options, config: CellConfig) -> list[Variant]:
-    """Return what to run: as it is, what else is wanted, and the joint cloud."""
+def variants(options: RobustnessOptions, config: CellConfig) -> list[Variant]:
+    """Return the variants to run: as configured, those of the options, and the joint samples."""
     rng = np.random.default_rng([options.common.seed, 7])
     found = [Variant(AS_CONFIGURED)]
     if options.numerics:
@@ -158,15 +159,19 @@ def variants(options: Options, config: CellConfig) -> list[Variant]:
     return found
 
 
-def config_of(options: Options, variant: Variant) -> CellConfig:
-    """Return a variant's configuration; raises `CellError` if it is impossible."""
+def config_of(options: RobustnessOptions, variant: Variant) -> CellConfig:
+    """Return the configuration of a variant.
+
+    Raises:
+        InputError: A value is invalid.
+    """
     changes = [f"{path}={value}" for path, value in variant.changes.items()]
     common = replace(options.common, overrides=(*options.common.overrides, *changes))
     return common.load_config()
 
 
-def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
-    """Run one trial of every case with a variant's numbers; return its row."""
+def run_variant(options: RobustnessOptions, variant: Variant) -> dict[str, Any]:
+    """Run one trial of every case with a variant; return its row of the result."""
     done = run_cases(
         cases_of("push", options.case),
         product=load_product("motor_unit"),
@@ -186,9 +191,9 @@ def run_variant(options: Options, variant: Variant) -> dict[str, Any]:
 
 
 def run_variants(
-    options: Options, wanted: Sequence[Variant], console: Console
+    options: RobustnessOptions, wanted: Sequence[Variant], console: Console
 ) -> Iterator[dict[str, Any]]:
-    """Run variants, several at a time; print which cases each of them flips, and yield its row."""
+    """Run variants in parallel; print which cases each of them flips, and yield its row."""
     base: dict[str, Any] | None = None
     spawn = multiprocessing.get_context("spawn")
     with ProcessPoolExecutor(options.workers, spawn) as pool:
@@ -200,7 +205,7 @@ def run_variants(
 
 
 def flips(row: Mapping[str, Any], base: Mapping[str, Any]) -> list[str]:
-    """Return the cases whose outcome differs from the configured one, with their displacement."""
+    """Return the cases whose outcome differs from that of the base, with their displacement."""
     return [
         f"{label} ({1e3 * (row['displacement_m'][label] or 0.0):.0f} mm)"
         for label, outcome in base["outcome"].items()
@@ -209,7 +214,7 @@ def flips(row: Mapping[str, Any], base: Mapping[str, Any]) -> list[str]:
 
 
 def robustness_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return in how many joint samples each case keeps its outcome."""
+    """Return a table of the number of joint samples in which each case keeps its outcome."""
     samples = [row for row in rows if row["variant"].startswith("sample")]
     table = Table("case", AS_CONFIGURED, "kept", title="Joint samples", title_justify="left")
     for label, outcome in rows[0]["outcome"].items():
@@ -219,7 +224,7 @@ def robustness_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def displacement_table(rows: Sequence[Mapping[str, Any]]) -> Table:
-    """Return how far the jig went in each variant [mm]; flipped outcomes are marked with *."""
+    """Return a table of the displacements of the jig [mm]; flipped outcomes are marked with *."""
     labels = list(rows[0]["outcome"])
     table = Table("variant", *labels, title=escape("Moved [mm]"), title_justify="left")
     for row in rows:
@@ -232,16 +237,23 @@ def displacement_table(rows: Sequence[Mapping[str, Any]]) -> Table:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the script; return the exit code."""
-    options = tyro.cli(Options, args=arguments, description=__doc__, config=(FlagCreatePairsOff,))
+    """Run the script; return 0, 1 for a run that failed, or 2 for bad input."""
+    options = tyro.cli(
+        RobustnessOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
+    )
     try:
-        return _run(options)
+        return run(options)
     except CellError as error:
         print(f"push_robustness: {error}", file=sys.stderr)
-        return 2
+        return 2 if isinstance(error, InputError) else 1
 
 
-def _run(options: Options) -> int:
+def run(options: RobustnessOptions) -> int:
+    """Run all variants, write ``result.json`` after each and print the tables; return 0.
+
+    Raises:
+        InputError: An option or a value is invalid.
+    """
     config = options.common.load_config()
     if options.samples < 0:
         raise BadUsage(f"--samples must be at least 0, not {options.samples}.")
@@ -260,7 +272,7 @@ def _run(options: Options) -> int:
     console.print(f"Speed for the paper's 78.2 mm: {speed:.3f} m/s", markup=False)
     wanted = variants(options, config)
     for variant in wanted:
-        config_of(options, variant)  # Impossible numbers are refused before hours of work.
+        config_of(options, variant)  # Invalid values are refused before hours of computation.
     rows: list[dict[str, Any]] = []
     result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
     with output_folder(Path(options.common.out)) as out:

@@ -1,9 +1,9 @@
-"""The assembly repeated with one seed after another: how often it succeeds, and how evenly.
+"""Repeated assembly with different seeds: success rate, and the range of every limited quantity.
 
     python -m experiments.repeat --seeds 10 --workers 2 --out out/repeat
 
-Every run is that of `soft-jig assemble`, in a process and a folder of its own. Prints one row per
-seed and one per limit, and writes both as summary.json.
+Every run is one of `soft-jig assemble`, in its own process and folder. Prints one row per seed and
+one per limit, and writes both to summary.json.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 import json
 import multiprocessing
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field, replace
 from typing import Annotated, Any
@@ -21,7 +21,7 @@ from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
-from cell.errors import CellError
+from cell.errors import CellError, InputError
 from cell.products.loading import load_product
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
@@ -34,13 +34,13 @@ Range = tuple[float, float]  # Smallest and largest value.
 
 
 @dataclass(frozen=True)
-class Options:
-    """Options of `soft-jig assemble`, how often, and on how many cores."""
+class RepeatOptions:
+    """Options of `soft-jig assemble`, the number of runs, and the number of cores."""
 
     assemble: OmitArgPrefixes[Assemble] = field(default_factory=Assemble)
 
     seeds: int = 10
-    """Number of runs; their seeds count up from --seed."""
+    """Number of runs, with consecutive seeds from --seed."""
 
     workers: Annotated[int, arg(metavar="CORES")] = 1
     """Runs at a time."""
@@ -50,39 +50,54 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the script; return 0 if every run succeeded, 1 if one failed, 2 for bad input."""
     try:
         options = tyro.cli(
-            Options, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
+            RepeatOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
         )
-        return _repeat(options)
+        return run_all(options)
     except CellError as error:
         print(f"repeat: {error}", file=sys.stderr)
-        return 2
+        return 2 if isinstance(error, InputError) else 1
 
 
-def _repeat(options: Options) -> int:
+def run_all(options: RepeatOptions) -> int:
+    """Run the assemblies, write ``summary.json`` and print the tables; return the exit code.
+
+    Raises:
+        InputError: An option is invalid.
+    """
     for name in ("seeds", "workers"):
         if getattr(options, name) < 1:
             raise BadUsage(f"--{name} must be >= 1, not {getattr(options, name)}.")
-    # Bad input is found here, once, and not in every process.
+    # Bad input is found once, here, instead of in every process.
     options.assemble.common.load_config()
     load_product(options.assemble.product)
     console = Console(quiet=options.assemble.common.quiet, highlight=False)
-    with output_folder(options.assemble.common.out) as out:
+    common = options.assemble.common
+    jobs = [
+        replace(
+            options.assemble, common=replace(common, seed=s, out=common.out / str(s), quiet=True)
+        )
+        for s in range(common.seed, common.seed + options.seeds)
+    ]
+    with output_folder(common.out) as out:
         spawn = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
-            results = list(pool.map(_run, _jobs(options)))
+            results = list(pool.map(_run, jobs))
         bounds = [(name, limit) for name, o in OPERATIONS.items() for limit in o.limits]
         ranges = {bound: _range(*bound, results) for bound in bounds}
-        write_json(out / "summary.json", _summary(results, ranges))
+        runs = [
+            {
+                "seed": result["seed"],
+                "verdict": result["verdict"],
+                "real_time_factor": result.get("real_time_factor"),
+                "failures": _failures(result),
+            }
+            for result in results
+        ]
+        found = {f"{name}/{limit.quantity}": extremes for (name, limit), extremes in ranges.items()}
+        write_json(out / "summary.json", {"runs": runs, "ranges": found})
     console.print(_seed_table(results))
     console.print(_range_table(ranges))
     return 0 if all(result["verdict"] == "success" for result in results) else 1
-
-
-def _jobs(options: Options) -> Iterator[Assemble]:
-    job, common = options.assemble, options.assemble.common
-    for seed in range(common.seed, common.seed + options.seeds):
-        own = replace(common, seed=seed, out=common.out / str(seed), quiet=True)
-        yield replace(job, common=own)
 
 
 def _run(job: Assemble) -> dict[str, Any]:
@@ -92,7 +107,7 @@ def _run(job: Assemble) -> dict[str, Any]:
 
 
 def _range(operation: str, limit: Limit, results: Sequence[dict[str, Any]]) -> Range | None:
-    """Return the smallest and the largest value of a limited quantity over all runs and parts."""
+    """Return the extreme values of a limited quantity over all runs and parts; None if none."""
     values = [
         value
         for result in results
@@ -105,27 +120,10 @@ def _range(operation: str, limit: Limit, results: Sequence[dict[str, Any]]) -> R
 
 
 def _failures(result: dict[str, Any]) -> list[str]:
-    """Return the phase that a run failed in, or the checks that it did not pass."""
+    """Return the phase in which a run failed, or the checks that failed."""
     if failure := result.get("failure"):
         return [f"{failure['phase']}: {failure['evidence']}"]
     return [check["quantity"] for step in result["steps"] for check in step["failed_checks"]]
-
-
-def _summary(
-    results: Sequence[dict[str, Any]], ranges: dict[Bound, Range | None]
-) -> dict[str, Any]:
-    return {
-        "runs": [
-            {
-                "seed": result["seed"],
-                "verdict": result["verdict"],
-                "real_time_factor": result.get("real_time_factor"),
-                "failures": _failures(result),
-            }
-            for result in results
-        ],
-        "ranges": {f"{name}/{limit.quantity}": found for (name, limit), found in ranges.items()},
-    }
 
 
 def _seed_table(results: Sequence[dict[str, Any]]) -> Table:

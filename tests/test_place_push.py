@@ -1,4 +1,4 @@
-"""The place and push commands: what they refuse, what they write, what regress compares."""
+"""The place and push commands: input validation, results, and the comparison of regress."""
 
 import json
 from pathlib import Path
@@ -15,7 +15,7 @@ from experiments.paper.cases import Case, CaseResult, TrialResult, judged
 from experiments.paper.place_push import run_experiment
 from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.regress import SUITES, TOLERANCES, drifts
-from experiments.paper.trial import Trial
+from experiments.paper.trial import TrialRecord
 from experiments.paper.trial_metrics import force_peaks
 
 
@@ -54,8 +54,8 @@ def test_bad_input_is_one_line_and_writes_nothing(
     assert said in refused(arguments, tmp_path, capsys)
 
 
-def test_trial_that_failed_before_anything_was_recorded_is_a_verdict() -> None:
-    trial = Trial(planned=RigidTransform(), failure=("pick: lift", "lost the part"))
+def test_trial_that_failed_before_any_record_is_a_verdict() -> None:
+    trial = TrialRecord(planned=RigidTransform(), failure=("pick: lift", "lost the part"))
     trial.log = Log().arrays()
     result = judged(Case(POSTURES["motor/P2"]), trial)
     assert not result.success
@@ -63,8 +63,8 @@ def test_trial_that_failed_before_anything_was_recorded_is_a_verdict() -> None:
 
 
 def test_diverged_trial_can_be_written() -> None:
-    """What is not finite is left out."""
-    trial = Trial(
+    """Values that are not finite are omitted."""
+    trial = TrialRecord(
         planned=RigidTransform(), held=RigidTransform(), placed=RigidTransform([0, 0, np.nan])
     )
     trial.failure = ("push", "the state is not finite")
@@ -73,9 +73,9 @@ def test_diverged_trial_can_be_written() -> None:
     assert np.isfinite(list(result.measured.values())).all()
 
 
-def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:
-    """The motor on a rigid plate: a verdict with figures, exit code 1, and a whole report."""
-    config = CellConfig.load(overrides={"workcell.fixture": "flat_plate"})
+def test_part_that_falls_over_is_a_failure_with_a_full_report(tmp_path: Path) -> None:
+    """The motor on a flat plate: a verdict with measurements, and exit code 1."""
+    config = CellConfig().with_changes({"workcell.fixture": "flat_plate"})
     experiment = Experiment("place", config, "rig", 1, 0, tmp_path, quiet=True)
     assert run_experiment(experiment, "motor/P2") == 1
     result = json.loads((tmp_path / "result.json").read_text())
@@ -91,13 +91,13 @@ def test_result_of_a_part_that_does_not_stand(tmp_path: Path) -> None:
 def case_with(label: str, displacements: list[float]) -> CaseResult:
     push = PUSHES[label]
     trials = [
-        TrialResult(d > 0.063, {"displacement_m": d}, None, Trial(planned=None))  # type: ignore
+        TrialResult(d > 0.063, {"displacement_m": d}, None, TrialRecord(planned=None))  # type: ignore
         for d in displacements
     ]
     return CaseResult(Case(push.posture, push), trials)
 
 
-def test_verdict_is_that_every_case_is_as_expected() -> None:
+def test_verdict_is_success_if_every_case_is_as_expected() -> None:
     good = [case_with("motor/P1/a", [0.07] * 5), case_with("motor/P2/a", [0.01] * 5)]
     assert verdict(good) == "success"
     assert verdict([case_with("motor/P2/a", [0.07, 0.07, 0.07, 0.01, 0.01])]) == "failure"
@@ -118,7 +118,7 @@ def test_displacements_are_compared_by_outcome() -> None:
     assert found["welch_p"] < 0.2
 
 
-def test_drift_is_a_metric_outside_of_its_tolerance_or_missing() -> None:
+def test_drift_is_a_metric_outside_its_tolerance_or_missing() -> None:
     stored = {"place motor/P2": {"success_rate": 1.0, "depth_m": 0.0100}}
     same = {"place motor/P2": {"success_rate": 1.0, "depth_m": 0.0103}}
     assert all(row.ok for row in drifts(stored, same))
@@ -127,14 +127,14 @@ def test_drift_is_a_metric_outside_of_its_tolerance_or_missing() -> None:
     assert not any(row.ok for row in drifts(stored, {}))
 
 
-def test_every_tolerance_has_a_reason_and_every_suite_known_cases() -> None:
+def test_every_tolerance_has_a_reason_and_every_suite_has_known_cases() -> None:
     assert all(len(tolerance.reason) > 20 for tolerance in TOLERANCES)
     labels = {"place": POSTURES, "push": PUSHES}
     for suite in SUITES.values():
         assert all(label is None or label in labels[command] for command, label in suite.cases)
 
 
-def test_a_push_that_the_plate_hardly_feels_is_no_second_peak() -> None:
+def test_push_with_a_small_force_is_no_second_peak() -> None:
     time = np.linspace(0.0, 2.0, 2001)
     weight, placing = 1.0, 20.0 * np.exp(-(((time - 0.5) / 0.1) ** 2))
     pushing = np.exp(-(((time - 1.5) / 0.1) ** 2))

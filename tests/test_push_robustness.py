@@ -1,4 +1,4 @@
-"""Robustness of the pushes: what is varied exists; the one fitted number follows from its law."""
+"""Robustness of the pushes: variants are valid; the one fitted number follows from its law."""
 
 import pytest
 
@@ -7,7 +7,7 @@ from experiments.push_robustness import (
     CONTROLS,
     NUMERICS,
     PARAMETERS,
-    Options,
+    RobustnessOptions,
     coasting_speed,
     config_of,
     flips,
@@ -19,13 +19,13 @@ from experiments.push_robustness import (
 
 
 def test_configured_speed_is_that_of_the_papers_mean_success() -> None:
-    """Rounded to 0.01 m/s; one of them moves the jig by 0.8 mm."""
+    """Rounded to 0.01 m/s, which moves the jig by 0.8 mm."""
     config = CellConfig()
     assert config.push.speed == pytest.approx(coasting_speed(config), abs=0.01)
 
 
-def test_samples_stay_within_the_spread_and_repeat() -> None:
-    options = Options(samples=3, spread=0.2, one_by_one=True, numerics=True)
+def test_samples_are_within_the_spread_and_reproducible() -> None:
+    options = RobustnessOptions(samples=3, spread=0.2, one_by_one=True, numerics=True)
     config = CellConfig()
     found = variants(options, config)
     assert found == variants(options, config)
@@ -36,7 +36,7 @@ def test_samples_stay_within_the_spread_and_repeat() -> None:
 
 
 @pytest.mark.parametrize("path", PARAMETERS)
-def test_every_parameter_is_a_setting_that_can_be_scaled(path: str) -> None:
+def test_every_parameter_can_be_scaled(path: str) -> None:
     config = CellConfig()
     changes = scaled(config, {path: 1.1})
     changed = CellConfig.load("default", changes)
@@ -48,20 +48,22 @@ def test_every_named_variant_is_a_valid_configuration(changes: dict) -> None:
     assert CellConfig.load("default", changes) != CellConfig()
 
 
-def test_wide_draws_stop_at_what_is_possible() -> None:
-    options = Options(samples=20, spread=0.7, one_by_one=True)
+def test_wide_samples_are_clipped_to_the_valid_range() -> None:
+    options = RobustnessOptions(samples=20, spread=0.7, one_by_one=True)
     found = variants(options, CellConfig())
     pressures = [config_of(options, variant).jig.vacuum.pressure for variant in found]
     assert max(pressures) == pytest.approx(101.325e3)
     assert min(pressures) < 40e3
 
 
-def test_controls_end_with_the_rigid_block() -> None:
-    found = variants(Options(samples=0, controls=True), CellConfig())
-    assert [variant.bed for variant in found] == ["soft"] * (1 + len(CONTROLS)) + ["rigid"]
+def test_last_control_is_the_flat_plate() -> None:
+    options = RobustnessOptions(samples=0, controls=True)
+    found = variants(options, CellConfig())
+    fixtures = [config_of(options, variant).workcell.fixture for variant in found]
+    assert fixtures == ["soft_jig"] * (1 + len(CONTROLS)) + ["flat_plate"]
 
 
-def test_a_flip_is_an_outcome_that_differs_from_the_configured_one() -> None:
+def test_flip_is_an_outcome_that_differs_from_the_configured_one() -> None:
     base = {"outcome": {"a": "success", "b": "failure"}, "displacement_m": {"a": 0.08, "b": 0.0}}
     other = {"outcome": {"a": "failure", "b": "failure"}, "displacement_m": {"a": 0.02, "b": 0.0}}
     assert flips(other, base) == ["a (20 mm)"]

@@ -1,4 +1,4 @@
-"""Repeating the assembly: bad input is found before any run, and every run is counted."""
+"""Repeated assembly: bad input is found before any run, and every run is counted."""
 
 import json
 from pathlib import Path
@@ -9,7 +9,7 @@ from experiments import repeat
 from planning.operations.limits import Limit
 
 
-def test_every_seed_is_run_and_its_failure_reported(tmp_path: Path) -> None:
+def test_every_seed_is_run_and_its_failure_is_reported(tmp_path: Path) -> None:
     """An infeasible order fails within a second, in its own process like any other run."""
     options = ["--seed", "3", "--seeds", "2", "--order", "motor,bolts,plate", "--quiet"]
     assert repeat.main([*options, "--out", str(tmp_path)]) == 1

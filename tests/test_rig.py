@@ -1,4 +1,4 @@
-"""The hand on its carriage: kinematics, paths, and one short trial on a rigid plate."""
+"""The hand on the carriage of the rig: kinematics, paths, and one short trial on a flat plate."""
 
 import functools
 from dataclasses import replace
@@ -17,17 +17,14 @@ from experiments.paper.push_rule import push_line
 from experiments.paper.rig.rig import HandPose, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation, smooth_path, stroke_path
 from experiments.paper.rig_hand import RigBench, tip_pose
-from experiments.paper.trial import Disturbance, check_fits, planned_pose, run_trial
+from experiments.paper.trial import TrialDisturbance, check_fits, planned_pose, run_trial
 from experiments.paper.trial_metrics import tilt_between
 
 
 @pytest.fixture(scope="module")
 def motor_rig():
-    return build_push_rig(
-        CellConfig.load(overrides={"workcell.fixture": "flat_plate"}),
-        load_product("motor_unit"),
-        "motor",
-    )
+    config = CellConfig().with_changes({"workcell.fixture": "flat_plate"})
+    return build_push_rig(config, load_product("motor_unit"), "motor")
 
 
 @functools.cache
@@ -43,7 +40,7 @@ def test_hand_pose_is_recovered_from_its_frame(turn: float, tilt: float) -> None
     assert (again.turn, again.tilt) == pytest.approx((turn, tilt))
 
 
-def test_carriage_puts_the_hand_where_it_is_told(motor_rig) -> None:
+def test_joints_of_the_carriage_give_the_hand_pose(motor_rig) -> None:
     pose = HandPose(np.array([0.05, 0.1, 0.35]), 0.8, 0.6)
     context = motor_rig.plant.CreateDefaultContext()
     motor_rig.plant.SetPositions(context, motor_rig.carriage, motor_rig.joints(pose))
@@ -52,8 +49,8 @@ def test_carriage_puts_the_hand_where_it_is_told(motor_rig) -> None:
 
 
 @pytest.mark.parametrize("posture", POSTURES.values(), ids=lambda posture: posture.label)
-def test_every_grasp_is_one_that_the_carriage_can_take(motor_rig, posture) -> None:
-    """The closing direction is level, and what is up in the table is up in the world."""
+def test_carriage_can_take_every_grasp(motor_rig, posture) -> None:
+    """The closing direction is horizontal, and the axis of the table points up in the world."""
     part = load_product("motor_unit").parts[posture.part]
     X_WP = planned_pose(part, posture, RigidTransform(), 0.05)
     pose = tip_pose(motor_rig, X_WP, posture.grasp)
@@ -66,8 +63,8 @@ def test_every_grasp_is_one_that_the_carriage_can_take(motor_rig, posture) -> No
 
 
 @pytest.mark.parametrize("push", PUSHES.values(), ids=lambda push: push.label)
-def test_push_is_level_and_meets_the_face_from_outside(push) -> None:
-    """The pushed face's points are on the part's surface, on the side that the hand comes from."""
+def test_push_is_horizontal_and_meets_the_face_from_outside(push) -> None:
+    """The points of the pushed face are on the surface of the part, on the side of the hand."""
     up, along = AXES[push.posture.up], AXES[push.along]
     assert up @ along == 0
     points = surface(push.posture.part)
@@ -75,7 +72,7 @@ def test_push_is_level_and_meets_the_face_from_outside(push) -> None:
     foot, top = 1e-3 * np.array(push.foot), 1e-3 * np.array(push.top)
     assert (top - foot) @ up > 0.004
     for point in (foot, top):
-        # Seen along the push the point is on the part, and little of the part lies before it.
+        # Along the push the point is on the part, and little of the part lies before it.
         seen = np.hypot((points - point) @ up, (points - point) @ across) < 2e-3
         assert seen.any()
         near = abs((points - point) @ across) < 2e-3
@@ -83,7 +80,7 @@ def test_push_is_level_and_meets_the_face_from_outside(push) -> None:
         assert not before.any() or push.label in ("motor/P1/a", "plate/P2/a")
 
 
-def test_paths_arrive_and_the_stroke_stops_dead() -> None:
+def test_paths_reach_their_end_and_the_stroke_stops_abruptly() -> None:
     q0, q1 = np.zeros(5), np.array([0.07, 0, 0, 0, 0])
     smooth, stroke = smooth_path(q0, q1, 0.3), stroke_path(q0, q1, 0.25, 2.5)
     for path in (smooth, stroke):
@@ -95,14 +92,14 @@ def test_paths_arrive_and_the_stroke_stops_dead() -> None:
     assert stroke.duration == pytest.approx(0.1 + 0.0575 / 0.25)
 
 
-def test_pins_do_not_let_the_motor_stand_on_a_rigid_plate(motor_rig) -> None:
-    """The paper's reason for a soft jig: on a metal plate the motor falls over."""
+def test_motor_falls_over_on_a_rigid_plate(motor_rig) -> None:
+    """The paper's reason for a soft jig: the terminals are not a stable base."""
     posture = POSTURES["motor/P2"]
-    disturbance = Disturbance.draw(motor_rig.config, np.random.default_rng(0))
+    disturbance = TrialDisturbance.draw(motor_rig.config, np.random.default_rng(0))
     trial = run_trial(RigBench(motor_rig, posture).begin(disturbance), None)
     result = judged(Case(posture), trial)
     assert not result.success
-    # The press was felt under the jig: the hand's limit is 20 N.
+    # The press acts on the force plate under the jig: the limit of the hand is 20 N.
     assert 15 < result.measured["place_normal_peak_N"] < 40
 
 
@@ -124,21 +121,21 @@ def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
 
 
 def test_push_that_cannot_be_started_is_a_verdict(motor_rig) -> None:
-    """A hand above the part would not meet it; a part that fell shows another side."""
+    """A hand above the part would miss it; a part that fell presents another face."""
     push, X_WJ = PUSHES["motor/P2/a"], motor_rig.config.workcell.X_WJ
     X_WP = planned_pose(motor_rig.part.part, push.posture, X_WJ, 0.0459)
     pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
     seen = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer
     stage, root = seen.stage, seen.root
     config = replace(stage.config, push=replace(stage.config.push, bed_clearance=0.2))
-    with pytest.raises(PhaseFailed, match="without a touch"):
+    with pytest.raises(PhaseFailed, match="miss the part"):
         push_line(replace(stage, config=config), root, push, X_WJ, X_WP)
     fallen = RotationMatrix.MakeYRotation(np.pi / 2) @ X_WP.rotation()
-    with pytest.raises(PhaseFailed, match="lies on the side"):
+    with pytest.raises(PhaseFailed, match="lies on the face"):
         push_line(stage, root, push, X_WJ, RigidTransform(fallen, X_WP.translation()))
 
 
-def test_tilt_does_not_see_a_turn_about_the_vertical() -> None:
+def test_tilt_is_independent_of_yaw() -> None:
     upright = RigidTransform(RollPitchYaw(0.3, -0.2, 0.5), [0, 0, 0])
     turned = RigidTransform(RotationMatrix.MakeZRotation(1.0), np.zeros(3)) @ upright
     leaning = RigidTransform(RotationMatrix.MakeXRotation(0.25), np.zeros(3)) @ upright
@@ -146,7 +143,7 @@ def test_tilt_does_not_see_a_turn_about_the_vertical() -> None:
     assert tilt_between(upright, leaning) == pytest.approx(0.25)
 
 
-def test_labels_choose_cases() -> None:
+def test_labels_select_cases() -> None:
     assert len(chosen("case", PUSHES, None)) == 9
     assert len(chosen("case", PUSHES, "motor")) == 3
     assert [push.label for push in chosen("case", PUSHES, "plate/P2/a")] == ["plate/P2/a"]
@@ -154,7 +151,7 @@ def test_labels_choose_cases() -> None:
         chosen("case", PUSHES, "motor/P9")
 
 
-def test_trials_draw_the_same_whatever_else_is_run() -> None:
+def test_errors_of_a_trial_are_independent_of_other_trials() -> None:
     first, again = (case_seed(1, "motor/P2", 3).normal(size=4) for _ in range(2))
     other = case_seed(1, "motor/P2", 4).normal(size=4)
     assert np.array_equal(first, again)
@@ -166,7 +163,7 @@ def test_wilson_interval_of_five_out_of_five() -> None:
     assert (low, high) == pytest.approx((0.5655, 1.0), abs=1e-3)
 
 
-def test_a_part_wider_than_the_bag_is_refused() -> None:
+def test_part_wider_than_the_bag_is_refused() -> None:
     config = CellConfig.load("default", ["jig.bag.cap_height=0.005"])
     part = load_product("motor_unit").parts["plate"]
     with pytest.raises(BadPart, match="70 mm wide"):

@@ -13,7 +13,7 @@ from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.push_rule import leading, push_line
 from experiments.paper.rig.rig import SLIDE_DRIVE, TURN_DRIVE
 from experiments.paper.robot_hand import RobotBench, RobotHand
-from experiments.paper.trial import Disturbance, run_trial
+from experiments.paper.trial import TrialDisturbance, run_trial
 from experiments.paper.trial_metrics import tilt_between
 from planning.motion.kinematics import tool_pose
 from planning.motion.timing import JointMotion
@@ -22,7 +22,7 @@ from planning.operations.placement import YAWS, pose_on_jig
 from planning.operations.push.phases import PushLine, can_push, push
 from planning.operations.stroke import Stroke
 
-STILL = Disturbance(RigidTransform(), np.zeros(2), seed=0)
+STILL = TrialDisturbance(RigidTransform(), np.zeros(2), seed=0)
 
 
 @functools.cache
@@ -114,7 +114,7 @@ def test_carriage_of_the_rig_is_as_stiff_as_the_arm() -> None:
 def test_disturbances_are_those_of_the_rig() -> None:
     """The jig stands where the draw says; the planner believes neither jig nor part displaced."""
     config = CellConfig()
-    draw = Disturbance.draw(config, np.random.default_rng(3))
+    draw = TrialDisturbance.draw(config, np.random.default_rng(3))
     robot = bench("motor/P2").begin(draw)
     p_WJ = robot.observer.X_WJ.translation() - np.array(config.workcell.p_WJ)
     assert p_WJ == pytest.approx([*draw.jig_offset, 0.0], abs=1e-9)

@@ -1,4 +1,4 @@
 """The paper's experiments: ``soft-jig place``, ``soft-jig push``, and ``soft-jig regress``.
 
-Postures and pushes, one trial with either hand, how a trial and a case are judged, their report.
+Postures and pushes, a trial with either hand, the criteria for trials and cases, and the report.
 """

@@ -1,4 +1,4 @@
-"""The paper's figures of the push experiment, drawn from our data."""
+"""The figures of the paper's push experiment, from our data."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from experiments.paper.trial_metrics import SUCCESS_DISTANCE, plate_forces, star
 from experiments.reporting.plots import DPI, SIZE, figure_png
 
 COLORS = {"success": "tab:blue", "failure": "tab:red"}
-# Mean displacement of the paper's successes and failures [m] [S]; nothing else is printed there.
+# Mean displacement of the paper's successes and failures [m] [S]; no other number is printed.
 PAPER_MEANS = {"success": 0.0782, "failure": 0.0542}
 
 
 def plot_forces(result: CaseResult) -> bytes:
-    """Plot F_n and F_s over time, every trial of a case; the push's start is marked."""
+    """Plot F_n and F_s over time for every trial of a case; the start of the push is marked."""
     figure = Figure(figsize=(SIZE[0], 2.6), dpi=DPI, layout="constrained")
     axes = figure.add_subplot()
     for k, trial in enumerate(result.trials):
@@ -36,7 +36,7 @@ def plot_forces(result: CaseResult) -> bytes:
 
 
 def plot_rates(results: Sequence[CaseResult]) -> bytes:
-    """Plot success rates with Wilson's 95 % intervals, the paper's rates as marks."""
+    """Plot success rates with Wilson's 95 % intervals, and the paper's rates as marks."""
     figure, axes = _bars(results, "success rate")
     for k, result in enumerate(results):
         rate = result.successes / len(result.trials)
@@ -50,7 +50,7 @@ def plot_rates(results: Sequence[CaseResult]) -> bytes:
 
 
 def plot_quantity(results: Sequence[CaseResult], quantity: str, label: str, scale: float) -> bytes:
-    """Plot mean and every trial of a quantity, by case."""
+    """Plot the mean and every trial of a quantity, by case."""
     figure, axes = _bars(results, label)
     for k, result in enumerate(results):
         values = scale * result.values(quantity)

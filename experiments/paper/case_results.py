@@ -22,22 +22,22 @@ from experiments.reporting.report import Picture, write_report
 
 ASSUMED = (
     "The paper's figures of postures and push directions are not public as text: the pictures and "
-    "the table show how its words are read here. Postures, directions, push height and suction "
-    "were chosen with its outcome table known; no number differs between cases or parts."
+    "the table show how its words are interpreted here. Postures, directions, push height and "
+    "suction were chosen with its outcome table known; no number differs between cases or parts."
 )
 HAND = (
     "The hand is a closed parallel gripper with fingers and palm of assumed size, pushed so that "
     "both fingertips' narrow sides lead; its palm overhangs their noses by 36 mm."
 )
 FORMULA = (
-    "The displacement is |dp_c|, how far the mean of the four screws moved. The formula printed in "
-    "the paper compares the screws with their own mean and is 0 for any pure translation, so it "
-    "cannot have given the paper's 78.2 mm; its value stands beside as printed_formula_m."
+    "The displacement is |dp_c|, that of the mean of the four screws. The formula printed in the "
+    "paper compares the screws with their own mean and is 0 for any pure translation, so it cannot "
+    "have given the paper's 78.2 mm; its value is reported as printed_formula_m."
 )
 FORCES = (
-    "The force plate's readings are less those at the start, with the jig at rest on it, and "
-    "averaged over 10 ms. While the hand travels from placing to pushing, part and jig sleep: the "
-    "last reading then stands for theirs."
+    "The readings of the force plate are relative to those at the start, with the jig at rest on "
+    "it, and averaged over 10 ms. While the hand travels from placing to pushing, part and jig "
+    "sleep, and the last reading is held."
 )
 # Of the printed table: quantity, heading, scale.
 PUSH_COLUMNS = (
@@ -53,11 +53,11 @@ PLACE_COLUMNS = (
 
 @dataclass(frozen=True)
 class Experiment:
-    """What was asked for.
+    """The options of a place or push experiment.
 
     Attributes:
         command: "place" or "push".
-        config: Every number.
+        config: Of the cell.
         hand: "rig" or "robot".
         trials: Of each case.
         seed: Of the disturbances.
@@ -82,12 +82,18 @@ def verdict(results: Sequence[CaseResult]) -> str:
 def write_case_results(
     experiment: Experiment, results: Sequence[CaseResult], pictures: Sequence[Picture], notes
 ) -> None:
-    """Write result and report."""
+    """Write ``result.json`` and ``report.html`` into the folder of the experiment."""
     for name in ("result.json", "report.html"):
         (experiment.out / name).unlink(missing_ok=True)
     result = summary(experiment, results)
     push = experiment.command == "push"
-    said = [ASSUMED, *([HAND, FORMULA] if push else []), FORCES, *notes, *_failures(results)]
+    failures = [
+        f"{result.case.label}, trial {k}: stopped in '{trial.failure[0]}': {trial.failure[1]}"
+        for result in results
+        for k, trial in enumerate(result.trials)
+        if trial.failure is not None
+    ]
+    remarks = [ASSUMED, *([HAND, FORMULA] if push else []), FORCES, *notes, *failures]
     write_report(
         experiment.out / "report.html",
         title=f"Experiment: {experiment.command}",
@@ -95,14 +101,14 @@ def write_case_results(
         result=result,
         pictures=pictures,
         plots=_plots(results, push),
-        notes=said,
+        notes=remarks,
     )
-    # Last: whoever finds it finds the rest, too.
+    # Last: where it exists, the rest exists, too.
     write_json(experiment.out / "result.json", result)
 
 
 def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, Any]:
-    """Return what ``result.json`` holds."""
+    """Return the content of ``result.json``."""
     trials = [trial.trial for result in results for trial in result.trials]
     simulated = sum(trial.sim_seconds for trial in trials)
     spent = sum(trial.cpu_seconds for trial in trials)
@@ -114,7 +120,10 @@ def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, 
         "hand": experiment.hand,
         "verdict": verdict(results),
         "cases": [_case(result) for result in results],
-        "by_outcome": _compared(results),
+        "by_outcome": {
+            "displacement_m": by_outcome(results, "displacement_m", PAPER_MEANS),
+            "push_shear_peak_N": by_outcome(results, "push_shear_peak_N"),
+        },
         "real_time_factor": simulated / max(spent, 1e-9),
         "cpu_seconds_per_trial": spent / max(len(trials), 1),
         "config": finite(experiment.config.to_dict()),
@@ -146,23 +155,15 @@ def _case(result: CaseResult) -> dict[str, Any]:
     }
 
 
-def _compared(results: Sequence[CaseResult]) -> dict[str, Any]:
-    """Return what the paper compares between successes and failures."""
-    return {
-        "displacement_m": by_outcome(results, "displacement_m", PAPER_MEANS),
-        "push_shear_peak_N": by_outcome(results, "push_shear_peak_N"),
-    }
-
-
 def by_outcome(
     results: Sequence[CaseResult], quantity: str, paper: Mapping[str, float] | None = None
 ) -> dict[str, Any]:
-    """Return a quantity's means over successful and failed trials, 95 % intervals, Welch's test.
+    """Compare a quantity between successful and failed trials: means, 95 % intervals, Welch's test.
 
     Args:
-        results: Of all cases together; the trials of a case are taken as independent.
-        quantity: As it was measured.
-        paper: Its mean by outcome in the paper, if that is known.
+        results: Of all cases; the trials of a case count as independent.
+        quantity: Name of the measured quantity.
+        paper: Its mean in the paper by outcome, if known.
     """
     groups: dict[str, list[float]] = {"success": [], "failure": []}
     for trial in (trial for result in results for trial in result.trials):
@@ -178,22 +179,13 @@ def by_outcome(
 
 
 def _mean(values: Sequence[float]) -> dict[str, Any]:
-    """Return number, mean and, for more than one, Student's 95 % interval."""
+    """Return number, mean and, for more than one value, Student's 95 % interval."""
     mean = float(np.mean(values))
     found: dict[str, Any] = {"trials": len(values), "mean": mean}
     if len(values) > 1:
         half = student.ppf(0.975, len(values) - 1) * np.std(values, ddof=1) / len(values) ** 0.5
         found["interval"] = [mean - float(half), mean + float(half)]
     return found
-
-
-def _failures(results: Sequence[CaseResult]) -> list[str]:
-    return [
-        f"{result.case.label}, trial {k}: stopped in '{trial.failure[0]}': {trial.failure[1]}"
-        for result in results
-        for k, trial in enumerate(result.trials)
-        if trial.failure is not None
-    ]
 
 
 def _plots(results: Sequence[CaseResult], push: bool) -> list[Picture]:
@@ -216,7 +208,7 @@ def _meaning(result: CaseResult) -> str:
 
 
 def case_table(command: str, results: Sequence[CaseResult]) -> Table:
-    """Return the table a person reads, no wider than 80 characters."""
+    """Return the table for the terminal, no wider than 80 characters."""
     table = Table(title=f"Experiment: {command}", title_justify="left")
     columns = PUSH_COLUMNS if command == "push" else PLACE_COLUMNS
     quantities, headings, scales = zip(*columns, strict=True)
@@ -233,7 +225,7 @@ def case_table(command: str, results: Sequence[CaseResult]) -> Table:
 
 
 def _spread(values: np.ndarray) -> str:
-    """Return mean and standard deviation of some values, if any, unless all are equal."""
+    """Return mean and standard deviation as text; only the mean if all values are equal."""
     if len(values) < 2 or np.ptp(values) == 0:
         return "".join(f"{value:.1f}" for value in values[:1])
     return f"{values.mean():.1f} ± {values.std(ddof=1):.1f}"

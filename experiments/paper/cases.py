@@ -1,21 +1,29 @@
-"""Run the cases of the place and push experiments, trial after trial, and judge them."""
+"""Run and judge the cases of the place and push experiments, trial by trial."""
 
 from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from scipy.stats import binomtest
 
 from cell.configuration.config import CellConfig
 from cell.products.product import Product
-from experiments.paper.postures import Posture, Push
+from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.rig.stage import Observer
 from experiments.paper.rig_hand import RigBench
 from experiments.paper.robot_hand import RobotBench
-from experiments.paper.trial import Bench, Disturbance, Trial, check_fits, ignore, run_trial
+from experiments.paper.trial import (
+    Bench,
+    TrialDisturbance,
+    TrialRecord,
+    check_fits,
+    ignore,
+    run_trial,
+)
 from experiments.paper.trial_metrics import (
     measure_place,
     measure_push,
@@ -26,15 +34,15 @@ from experiments.paper.trial_metrics import (
 
 @dataclass(frozen=True)
 class Case:
-    """One row of an experiment's table: a posture, and a push if there is one.
+    """One case of an experiment: a posture, with a push or without.
 
     Attributes:
-        posture: How the part is placed.
+        posture: In which the part is placed.
         push: None in the place experiment.
     """
 
     posture: Posture
-    push: Push | None = None
+    push: PushSpec | None = None
 
     @property
     def label(self) -> str:
@@ -43,7 +51,7 @@ class Case:
 
     @property
     def expected(self) -> str:
-        """What the paper saw: "success" or "failure"; every placement succeeded."""
+        """Outcome in the paper: "success" or "failure"; every placement succeeded."""
         return "success" if self.push is None else self.push.expected
 
 
@@ -53,15 +61,15 @@ class TrialResult:
 
     Attributes:
         success: By the paper's criterion.
-        measured: Quantity -> value; SI units in the names.
-        failure: Phase and evidence if it stopped early.
-        trial: All of it.
+        measured: Value by quantity; SI units in the names.
+        failure: Phase and evidence if the trial stopped early.
+        trial: The record of the trial.
     """
 
     success: bool
     measured: dict[str, float]
     failure: tuple[str, str] | None
-    trial: Trial
+    trial: TrialRecord
 
 
 @dataclass
@@ -73,7 +81,7 @@ class CaseResult:
 
     @property
     def successes(self) -> int:
-        """How many trials succeeded."""
+        """Number of successful trials."""
         return sum(result.success for result in self.trials)
 
     @property
@@ -92,7 +100,7 @@ class CaseResult:
         return wilson(self.successes, len(self.trials))
 
     def values(self, quantity: str) -> np.ndarray:
-        """Return a quantity of every trial that has it (n,)."""
+        """Return the values (n,) of a quantity over the trials that have it."""
         return np.array(
             [result.measured[quantity] for result in self.trials if quantity in result.measured]
         )
@@ -110,7 +118,7 @@ def wilson(successes: int, trials: int) -> tuple[float, float]:
 
 
 def case_seed(seed: int, label: str, trial: int) -> np.random.Generator:
-    """Return the random numbers of one trial: the same whichever other cases are run."""
+    """Return the random generator of one trial, independent of the other cases that are run."""
     return np.random.default_rng([seed, zlib.crc32(label.encode()), trial])
 
 
@@ -124,48 +132,41 @@ def run_cases(
     hand: str = "rig",
     watch: Callable[[Case, str, Observer], None] | None = None,
 ) -> Iterator[tuple[CaseResult, TrialResult]]:
-    """Run every trial of every case; yield each when it is done, with its case so far.
+    """Run every trial of every case; yield each when it is done, with the results of its case.
 
     Args:
-        cases: Which.
-        product: Where the parts are described.
-        config: Every number, the same for all cases.
+        cases: To run.
+        product: With the parts.
+        config: Of the cell, the same for all cases.
         trials: Of each case.
-        seed: Seeds the disturbances: the same for both hands.
+        seed: Of the disturbances, which are the same for both hands.
         hand: "rig" or "robot".
-        watch: Told of the events of the first trial of each case.
+        watch: Called with the events of the first trial of each case.
 
     Raises:
-        InputError: Before any trial: a part that has no room on the bag (`BadPart`).
+        BadPart: Before any trial: a part is wider than the bag.
     """
     for case in cases:
         check_fits(config, product.parts[case.posture.part], case.posture)
     for case in cases:
-        bench = _bench(case, product, config, hand)
+        bench: Bench
+        if hand == "robot":
+            bench = RobotBench.build(config, product, case.posture, case.push)
+        else:
+            bench = RigBench.build(config, product, case.posture)
         result = CaseResult(case)
         for k in range(trials):
-            disturbance = Disturbance.draw(config, case_seed(seed, case.label, k))
-            follow = ignore if watch is None or k > 0 else _bound(watch, case)
+            disturbance = TrialDisturbance.draw(config, case_seed(seed, case.label, k))
+            follow = ignore if watch is None or k > 0 else partial(watch, case)
             trial = run_trial(bench.begin(disturbance), case.push, follow)
             result.trials.append(judged(case, trial))
             yield result, result.trials[-1]
 
 
-def _bench(case: Case, product: Product, config: CellConfig, hand: str) -> Bench:
-    """Build what a case's trials are run with; cheap beside a trial."""
-    if hand == "robot":
-        return RobotBench.build(config, product, case.posture, case.push)
-    return RigBench.build(config, product, case.posture)
+def judged(case: Case, trial: TrialRecord) -> TrialResult:
+    """Return a trial with its measurements and whether it succeeded.
 
-
-def _bound(watch: Callable[[Case, str, Observer], None], case: Case) -> Callable:
-    return lambda event, observer: watch(case, event, observer)
-
-
-def judged(case: Case, trial: Trial) -> TrialResult:
-    """Return a trial with what was measured and whether it succeeded.
-
-    What is not finite, after a simulation has diverged, was not measured.
+    Values that are not finite, after a simulation has diverged, are omitted.
     """
     measured = measure_place(trial)
     if case.push is None:

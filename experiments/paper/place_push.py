@@ -20,10 +20,10 @@ PICTURED = {"place": ("placed",), "push": ("before", "after", "end")}
 
 
 def cases_of(command: str, label: str | None) -> list[Case]:
-    """Return the cases of an experiment that a label names; None: all.
+    """Return the cases of an experiment that a label selects; None selects all.
 
     Raises:
-        UnknownName: Listing the known ones.
+        UnknownName: No case has this label.
     """
     if command == "place":
         return [Case(posture) for posture in chosen("posture to place", POSTURES, label)]
@@ -31,20 +31,20 @@ def cases_of(command: str, label: str | None) -> list[Case]:
 
 
 def with_pressure(config: CellConfig, pressure_kpa: float | None) -> CellConfig:
-    """Return the configuration with another vacuum; None leaves it."""
+    """Return the configuration with another vacuum [kPa]; None keeps it."""
     if pressure_kpa is None:
         return config
     return config.with_changes({"jig.vacuum.pressure": 1e3 * pressure_kpa})
 
 
 def check_trials(trials: int) -> None:
-    """Raise `InputError` unless there is something to do."""
+    """Raise `InputError` unless the number of trials is positive."""
     if trials < 1:
         raise InputError(f"--trials must be at least 1, not {trials}.")
 
 
 def run_experiment(experiment: Experiment, label: str | None) -> int:
-    """Run the cases that a label names; write result and report.
+    """Run the cases that a label selects; write result and report.
 
     Returns:
         0 if every case came out as expected, else 1.
@@ -77,7 +77,7 @@ def run_experiment(experiment: Experiment, label: str | None) -> int:
 
 
 class _Album:
-    """Pictures of the first trial of each case, where the machine can render."""
+    """Pictures of the first trial of each case, if the machine can render."""
 
     def __init__(self, experiment: Experiment) -> None:
         self.wanted = PICTURED[experiment.command]
@@ -85,18 +85,16 @@ class _Album:
         problem = rendering_problem()
         self.notes = [] if problem is None else [f"No pictures: {problem}."]
 
-    def take(self, case: Case, event: str, seen: Observer) -> None:
-        """Take the picture of an event."""
-        ended_early = event == "end" and not self._is_last(case, "after")
+    def take(self, case: Case, event: str, observer: Observer) -> None:
+        """Take the picture of an event, for the end only if the trial stopped early."""
+        last = self.pictures[-1][0] if self.pictures else ""
+        ended_early = event == "end" and last != f"{case.label}: after"
         if self.notes or event not in self.wanted or (event == "end" and not ended_early):
             return
-        view = view_of(seen.stage.config.workcell.X_WJ)
+        view = view_of(observer.stage.config.workcell.X_WJ)
         caption = f"{case.label}: {event}"
-        scene = take_picture(seen.stage.scene_graph, seen.root, view)
+        scene = take_picture(observer.stage.scene_graph, observer.root, view)
         self.pictures.append((caption, scene))
-
-    def _is_last(self, case: Case, event: str) -> bool:
-        return bool(self.pictures) and self.pictures[-1][0] == f"{case.label}: {event}"
 
 
 def view_of(X_WJ: RigidTransform) -> View:

@@ -1,7 +1,7 @@
 """The paper's postures and push directions, in one table.
 
-The figures that define them are missing from the public text, so this is a reading of it, stated
-case by case; the report draws every one. P is the part's frame: the motor's has +z along the shaft
+The figures that define them are not part of the public text, so this is an interpretation, stated
+case by case; the report shows every one. P is the part's frame: the motor's has +z along the shaft
 and the shaft's eccentricity towards +y; the plate's has the hole's axis along z, the face between
 z = 0 (motor side) and 5 mm, and the foot at y = -33 .. -28 mm, reaching to z = -15 mm.
 """
@@ -27,16 +27,16 @@ AXES = {
 
 @dataclass(frozen=True)
 class Posture:
-    """How a part stands on the jig, and how a hand brings it there.
+    """The orientation of a part on the jig, and the grasp with which it is placed.
 
     Attributes:
         part: "motor" or "plate".
         name: The paper's label.
         up: Axis of P that points up.
         meaning: In words.
-        grasp: From above or from the side, chosen by hand as in the paper.
-        X_PTurned: How the part lies in the tray, from its pose in the product file: turned so that
-            this grasp is within the robot's reach there, too.
+        grasp: From above or from the side, chosen manually as in the paper.
+        X_PTurned: Rotation of the part in the tray relative to the product file, such that the
+            robot can reach this grasp there, too.
     """
 
     part: str
@@ -53,14 +53,14 @@ class Posture:
 
 
 @dataclass(frozen=True)
-class Push:
+class PushSpec:
     """A straight push of a part that the jig holds.
 
     Attributes:
-        posture: How the part stands.
+        posture: Of the part.
         direction: The paper's label.
         along: Direction of the push, an axis of P.
-        foot, top: Lower and upper end of the pushed face where the hand meets it, in P [mm].
+        foot, top: (3,) lower and upper end of the pushed face at the point of contact, in P [mm].
         expected: "success" or "failure", as in the paper.
         meaning: In words.
     """
@@ -93,29 +93,24 @@ def _grasp(
     return Grasp(name, jaw, RigidTransform(R_PJaw, np.array(at_mm) * MM), width_mm * MM, force)
 
 
-def _leaning(axis: str, towards: str, angle_deg: float) -> np.ndarray:
-    """Return an axis of P, leaning towards another one, as a unit vector (3,)."""
-    angle = np.deg2rad(angle_deg)
-    return np.cos(angle) * AXES[axis] + np.sin(angle) * AXES[towards]
-
-
 def _turned(axis: str, angle_deg: float, through_mm: tuple[float, float, float]) -> RigidTransform:
-    """Return the pose of a part turned about an axis of P through a point of P."""
+    """Return the pose of a part turned about an axis of P through a point of P [mm]."""
     p = np.array(through_mm) * MM
     turn = RigidTransform(AngleAxis(np.deg2rad(angle_deg), AXES[axis]), [0.0, 0.0, 0.0])
     return RigidTransform(p) @ turn @ RigidTransform(-p)
 
 
-# The motor is held by its sides, lying with a level hand and the recessed jaws above; the level
-# plate from above, close to its centre of mass, with the fingertips beyond the foot; the plate on
-# end by its edges, on the foot with a hand that leans by 20 deg, for a level one cannot fetch it.
-# The force is the most that the gripper has: what is pressed off the pads' middle turns in a weaker
-# grip.
+# The motor is gripped by its sides, lying with a horizontal hand and the recessed jaws above; the
+# horizontal plate from above, close to its centre of mass, with the fingertips beyond the foot; the
+# upright plate by its edges, on the foot with a hand tilted by 20 deg (a horizontal one cannot
+# reach it). The force is the maximum of the gripper: in a weaker grip a part that is pressed away
+# from the middle of the pads turns.
 MOTOR_LYING = _grasp("gearbox", "tip", (0, 0, -14), AXES["-z"], "+x", 36.8, 65.0)
 MOTOR_STANDING = _grasp("can", "tip", (0, 0, -33), AXES["-y"], "+x", 34.8, 65.0)
 PLATE_FOOT_UP = _grasp("edges", "wide", (0, -21, -2.5), AXES["+z"], "+x", 70.0, 65.0)
 PLATE_FOOT_DOWN = _grasp("edges", "wide", (0, -21, 7.5), AXES["-z"], "-x", 70.0, 65.0)
-LEANING = _leaning("-y", "-z", 20.0)
+LEAN = np.deg2rad(20.0)
+LEANING = np.cos(LEAN) * AXES["-y"] + np.sin(LEAN) * AXES["-z"]
 PLATE_ON_FOOT = _grasp("edges", "wide", (0, 17, 2.5), LEANING, "-x", 70.0, 65.0)
 PLATE_ON_SIDE = _grasp("edges", "wide", (20, -3, 2.5), AXES["-x"], "+y", 60.0, 65.0)
 
@@ -141,9 +136,9 @@ POSTURES = {
 }
 
 
-def _push(label: str, along: str, foot, top, expected: str, meaning: str) -> Push:
+def _push(label: str, along: str, foot, top, expected: str, meaning: str) -> PushSpec:
     part, name, direction = label.split("/")
-    return Push(POSTURES[f"{part}/{name}"], direction, along, foot, top, expected, meaning)
+    return PushSpec(POSTURES[f"{part}/{name}"], direction, along, foot, top, expected, meaning)
 
 
 S, F = "success", "failure"
@@ -164,10 +159,15 @@ PUSHES = {
 
 
 def chosen(kind: str, table: dict, case: str | None) -> list:
-    """Return the cases that a label names: one, all of a part or posture, or all of the table.
+    """Return the entries of a table that a label selects: one, or all of a part or posture.
+
+    Args:
+        kind: Of entries, for the error message.
+        table: Entries by label.
+        case: The label; None selects all.
 
     Raises:
-        UnknownName: Listing the known ones.
+        UnknownName: No entry has this label.
     """
     if case is None:
         return list(table.values())

@@ -1,8 +1,8 @@
-"""``soft-jig regress``: the experiments' outcomes and metrics against stored ones.
+"""``soft-jig regress``: outcomes and metrics of the experiments against a stored baseline.
 
-Each metric has a tolerance with a reason. What is compared is the mean over the trials of a case;
-with one machine and one seed every run is bit-identical, so the tolerances are for a change of
-machine or library, and for changes of the model that are meant to change nothing.
+Each metric has a tolerance with a reason. The compared value is the mean over the trials of a case.
+On one machine with one seed every run is bit-identical; the tolerances are for another machine or
+library, and for changes of the model that should not change results.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ SEED = 0
 
 @dataclass(frozen=True)
 class Tolerance:
-    """How far a metric may drift.
+    """The allowed drift of a metric.
 
     Attributes:
         metric: Its name, with SI units.
-        absolute: In the metric's unit.
-        relative: Of the stored value; the larger of the two counts.
-        reason: Why this much.
+        absolute: In the unit of the metric.
+        relative: To the stored value; the larger of the two applies.
+        reason: For this tolerance.
     """
 
     metric: str
@@ -47,30 +47,35 @@ class Tolerance:
     reason: str
 
     def holds(self, stored: float, now: float) -> bool:
-        """Return whether the drift is inside."""
+        """Return whether the drift is within the tolerance."""
         return abs(now - stored) <= max(self.absolute, self.relative * abs(stored))
 
 
 TOLERANCES = (
     Tolerance("success_rate", 0.0, 0.0, "an outcome that flips is a change of behaviour"),
     Tolerance("depth_m", 5e-4, 0.05, "the press stops within a step of its force limit"),
-    Tolerance("tilt_rad", 0.01, 0.0, "half a degree is what the grasp's scatter makes"),
-    Tolerance("release_shift_m", 1e-4, 0.0, "a third of the allowed kick of 0.3 mm"),
+    Tolerance("tilt_rad", 0.01, 0.0, "half a degree is the scatter due to the grasp"),
+    Tolerance("release_shift_m", 1e-4, 0.0, "a third of the allowed jump of 0.3 mm"),
     Tolerance("place_normal_peak_N", 0.5, 0.05, "one step of the press, 20 N in 10 mm"),
-    Tolerance("displacement_m", 3e-3, 0.05, "half of what separates 63 mm from the 70 mm pushed"),
+    Tolerance(
+        "displacement_m",
+        3e-3,
+        0.05,
+        "half of the 7 mm between limit and push",
+    ),
     Tolerance("push_shear_peak_N", 1.0, 0.15, "a peak of stick-slip, averaged over 10 ms"),
-    Tolerance("hand_force_peak_N", 2.0, 0.2, "the blow that sets the jig going, over 10 ms"),
-    Tolerance("part_rotation_rad", 0.05, 0.15, "once it topples, where it ends is chance"),
+    Tolerance("hand_force_peak_N", 2.0, 0.2, "the impact that starts the jig, averaged over 10 ms"),
+    Tolerance("part_rotation_rad", 0.05, 0.15, "once the part topples, its final pose is chaotic"),
 )
 
 
 @dataclass(frozen=True)
 class Suite:
-    """What is run.
+    """The cases of a regression run.
 
     Attributes:
         name: "quick" or "full".
-        cases: Experiment and label of each case; None is all of them.
+        cases: Experiment and label of each case; None stands for all of them.
         trials: Of each case.
     """
 
@@ -79,8 +84,8 @@ class Suite:
     trials: int
 
 
-# Two pushes that succeed and one that fails, the steadiest in the cloud of `push_robustness`: what
-# hangs on rounding, as whether motor P2-a wedges or topples, is in the full suite only.
+# Two pushes that succeed and one that fails, the most robust ones of `push_robustness`: cases that
+# depend on rounding, such as whether motor P2-a wedges or topples, are in the full suite only.
 QUICK = (
     ("place", "motor/P2"),
     ("push", "plate/P1/a"),
@@ -108,7 +113,7 @@ class Drift:
 
     @property
     def ok(self) -> bool:
-        """Whether it is in both and inside of its tolerance."""
+        """Whether the metric exists in both and is within its tolerance."""
         known = self.stored is not None and self.now is not None
         return known and self.tolerance.holds(self.stored or 0.0, self.now or 0.0)
 
@@ -117,7 +122,7 @@ Metrics = dict[str, dict[str, float]]  # Case -> metric -> value.
 
 
 def metrics_of(results: Mapping[str, CaseResult]) -> Metrics:
-    """Return what is stored of each case."""
+    """Return the stored metrics of each case."""
     found = {}
     for name, result in results.items():
         means = result.means() | {"success_rate": result.successes / len(result.trials)}
@@ -127,7 +132,7 @@ def metrics_of(results: Mapping[str, CaseResult]) -> Metrics:
 
 
 def drifts(stored: Metrics, now: Metrics) -> list[Drift]:
-    """Compare, in the order of the present run; cases only stored come last."""
+    """Return the drift of every metric, in the order of the present run, then stored cases."""
     rows = []
     for case in dict.fromkeys([*now, *stored]):
         before, after = stored.get(case, {}), now.get(case, {})
@@ -158,10 +163,10 @@ def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, C
 
 
 def read_baseline(path: Path) -> tuple[Metrics, str]:
-    """Read stored metrics, and the version of Drake that they hold for.
+    """Return the stored metrics, and the version of Drake with which they were made.
 
     Raises:
-        InputError: There are none, or they cannot be read.
+        InputError: The file is missing or cannot be read.
     """
     try:
         stored = json.loads(path.read_text(encoding="utf-8"))
@@ -173,10 +178,10 @@ def read_baseline(path: Path) -> tuple[Metrics, str]:
 
 
 def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, quiet: bool) -> int:
-    """Run a suite and compare it with what is stored, or store it anew.
+    """Run a suite and compare it with the baseline, or update the baseline.
 
     Returns:
-        0 if nothing drifted out of its tolerance or the stored metrics were updated, else 1.
+        0 if every metric is within its tolerance or the baseline was updated, else 1.
     """
     console = Console(quiet=quiet, highlight=False)
     suite, path = SUITES[suite_name], BASELINE / f"{suite_name}.json"
@@ -220,7 +225,7 @@ def _result(suite: str, success: bool, rows: Sequence[Drift], config: CellConfig
 
 
 def drift_table(rows: Sequence[Drift], title: str, word: str) -> Table:
-    """Return one line per metric; those outside of their tolerance are marked with a word."""
+    """Return one line per metric; a word marks those outside their tolerance."""
     table = Table(title=title, title_justify="left")
     for heading in ("case", "metric", "stored", "now", "allowed", ""):
         table.add_column(heading, justify="left" if heading in ("case", "metric") else "right")

@@ -1,4 +1,4 @@
-"""The hand on the rig's carriage, in a trial: the part waits in it, over the jig."""
+"""The hand on the carriage of the rig in a trial, which starts with the part above the jig."""
 
 from __future__ import annotations
 
@@ -14,18 +14,18 @@ from experiments.paper.postures import Posture
 from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation
 from experiments.paper.rig.stage import Observer
-from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
+from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
 from planning.operations.pick_place.phases import DEEPEST, JAM_TIME, PRESS_SPEED
 from planning.operations.push.phases import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
 
-HOLD_TIME = 0.2  # The hand stays this long after the bag has frozen [s] [A].
-RETREAT = 0.08
-TRAVEL_SPEED = 0.3  # Of the hand in the free [m/s] [A].
+HOLD_TIME = 0.2  # From the freezing of the bag to the release [s] [A].
+RETREAT = 0.08  # Of the hand after the release [m].
+TRAVEL_SPEED = 0.3  # Of the hand in free air [m/s] [A].
 
 
 def tip_pose(rig: Rig, X_WP: RigidTransform, grasp: Grasp) -> HandPose:
-    """Return where the hand is when its jaw is at a grasp of the part."""
+    """Return the hand pose with the jaw at a grasp of the part."""
     hand = rig.gripper.instance
     X_TipMount = rig.plant.GetFrameByName("tip", hand).GetFixedPoseInBodyFrame().inverse()
     X_TipJaw = X_TipMount @ rig.plant.GetFrameByName(grasp.jaw, hand).GetFixedPoseInBodyFrame()
@@ -34,11 +34,11 @@ def tip_pose(rig: Rig, X_WP: RigidTransform, grasp: Grasp) -> HandPose:
 
 @dataclass(frozen=True)
 class RigBench:
-    """A built rig, for the trials of one posture.
+    """A built rig for the trials of one posture.
 
     Attributes:
-        rig: Built for the posture's part.
-        posture: How the part is placed.
+        rig: Built for the part of the posture.
+        posture: In which the part is placed.
     """
 
     rig: Rig
@@ -46,11 +46,11 @@ class RigBench:
 
     @staticmethod
     def build(config: CellConfig, product: Product, posture: Posture) -> RigBench:
-        """Build it."""
+        """Build the rig for the part of a posture."""
         return RigBench(build_push_rig(config, product, posture.part), posture)
 
-    def begin(self, disturbance: Disturbance) -> RigHand:
-        """Put a stand with the part over the jig, and the open hand around it."""
+    def begin(self, disturbance: TrialDisturbance) -> RigHand:
+        """Set up a trial: the part on a stand over the jig, the open hand around it."""
         config, X_WJ = self.rig.config, self.rig.config.workcell.X_WJ
         height = config.jig.bag.cap_height + HOVER
         X_WP = planned_pose(self.rig.part.part, self.posture, X_WJ, height)
@@ -69,8 +69,8 @@ class RigHand:
 
     Attributes:
         simulation: Of the rig.
-        grasp: How it holds the part.
-        planned: X_JP as aimed at.
+        grasp: Of the part.
+        planned: Nominal X_JP over the jig.
     """
 
     simulation: RigSimulation
@@ -79,17 +79,24 @@ class RigHand:
 
     @property
     def observer(self) -> Observer:
-        """Looks at part and jig, and records."""
+        """Observer of part and jig."""
         return self.simulation.observer
 
     def press(self) -> None:
-        """Grip, press, freeze.
+        """Grip the part, press it in and freeze the bag.
 
-        The robot stops for 0.2 s between press and pump and pumps for 1.5 s at least; here the
-        pump starts at once, and the hand lets go soon after the bed has frozen.
+        The robot waits for 0.2 s between press and evacuation and evacuates for at least 1.5 s;
+        here evacuation starts at once, and the hand releases soon after the bed has frozen.
         """
-        self._grip()
         simulation, force = self.simulation, self.simulation.rig.config.placement.press_force
+        simulation.begin("grip")
+        simulation.wait(READY_TIME)
+        simulation.observer.tare()
+        simulation.observer.recording = True
+        simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp), self.grasp.force)
+        simulation.wait(GRIP_TIME)
+        simulation.rig.let_part_go(simulation.root)
+        simulation.wait(0.1)
         simulation.begin("press")
         simulation.press_with_part()
         if not simulation.lower(PRESS_SPEED, HOVER + DEEPEST, force):
@@ -104,20 +111,8 @@ class RigHand:
         if not simulation.fixed:
             raise PhaseFailed("jam", f"the fixture does not hold after {JAM_TIME:g} s")
 
-    def _grip(self) -> None:
-        """Take the part from its stand."""
-        simulation = self.simulation
-        simulation.begin("grip")
-        simulation.wait(READY_TIME)
-        simulation.observer.tare()
-        simulation.observer.recording = True
-        simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp), self.grasp.force)
-        simulation.wait(GRIP_TIME)
-        simulation.rig.let_part_go(simulation.root)
-        simulation.wait(0.1)
-
     def let_go(self) -> None:
-        """Open the jaws and back off along the approach direction."""
+        """Open the jaws and retreat along the approach direction."""
         simulation = self.simulation
         simulation.begin("release")
         simulation.jaws(tip_opening(simulation.rig.gripper.model, self.grasp) + CLEARANCE)
@@ -128,7 +123,7 @@ class RigHand:
             simulation.move(replace(start, p_WT=back), speed)
 
     def approach(self, line: PushLine) -> None:
-        """Come from above and behind."""
+        """Approach from above and behind."""
         simulation = self.simulation
         simulation.begin("approach")
         simulation.jaws(0.0)
@@ -148,6 +143,6 @@ class RigHand:
         self.simulation.push(goal, line.stroke.speed, line.stroke.acceleration)
 
     def wait(self, phase: str, seconds: float) -> None:
-        """Hold still."""
+        """Hold the hand still."""
         self.simulation.begin(phase)
         self.simulation.wait(seconds)

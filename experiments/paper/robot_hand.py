@@ -23,10 +23,10 @@ from cell.products.product import Grasp, Product
 from cell.simulation.events import rest_jig, wake_jig
 from cell.simulation.phase import Outcome, Phase, PhaseFailed, after
 from cell.simulation.simulation import Simulation
-from experiments.paper.postures import Posture, Push
+from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer, Stage
-from experiments.paper.trial import HOVER, READY_TIME, Disturbance, planned_pose
+from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
 from planning.operations.grasping import HandPhase
 from planning.operations.pick_place.phases import PlacePhase, pick_place
 from planning.operations.placement import anywhere
@@ -105,18 +105,18 @@ class RobotBench:
     cell: Cell
     stage: Stage
     posture: Posture
-    push: Push | None
+    push: PushSpec | None
 
     @staticmethod
     def build(
-        config: CellConfig, product: Product, posture: Posture, push: Push | None
+        config: CellConfig, product: Product, posture: Posture, push: PushSpec | None
     ) -> RobotBench:
         """Build it."""
         config = replace(config, workcell=replace(config.workcell, jig_base_fixed=False))
         cell = build_cell(config, presented(product, posture))
         return RobotBench(cell, _stage(cell, posture.part), posture, push)
 
-    def begin(self, disturbance: Disturbance) -> RobotHand:
+    def begin(self, disturbance: TrialDisturbance) -> RobotHand:
         """Put part and jig in their places, the arms at home."""
         simulation = Simulation(self.cell)
         X_WJ = disturbance.displaced(self.cell.X_WJ)

@@ -1,4 +1,4 @@
-"""One trial: a hand places a part on the jig, and pushes it if that is asked for."""
+"""One trial: a hand places a part on the jig, and pushes it if the case has a push."""
 
 from __future__ import annotations
 
@@ -13,27 +13,27 @@ from cell.configuration.config import CellConfig
 from cell.errors import BadPart
 from cell.products.product import Part
 from cell.simulation.phase import PhaseFailed
-from experiments.paper.postures import Posture, Push
+from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer
 from planning.operations.pick_place.phases import SETTLE_TIME
 from planning.operations.placement import upright
 from planning.operations.push.phases import PushLine
 
-HOVER = 0.001  # The part starts this far above the bag, or would, where depth is counted [m] [A].
-REST_TIME = 0.3  # After the hand has left, before it comes to push [s] [A].
-READY_TIME = 0.1  # With everything awake, before anything touches [s] [A].
-COAST_TIME = 0.6  # From the hand's stop until everything rests again [s] [A].
+HOVER = 0.001  # Clearance of the part over the bag at the reference pose for the depth [m] [A].
+REST_TIME = 0.3  # From the retreat of the hand to its approach for a push [s] [A].
+READY_TIME = 0.1  # With everything awake, before the first contact [s] [A].
+COAST_TIME = 0.6  # From the stop of the hand until everything is at rest again [s] [A].
 
 
 @dataclass(frozen=True)
-class Disturbance:
-    """What is not where it should be in a trial: the same draws for every hand.
+class TrialDisturbance:
+    """Placement errors of a trial, the same for both hands.
 
     Attributes:
-        X_PDrawn: Error of the part in the grasp.
-        jig_offset: (2,) of the jig on the force plate [m].
-        seed: Of what else is random with a robot: sensor noise, sampling planners.
+        X_PDrawn: Pose error of the part in the grasp.
+        jig_offset: (2,) position error of the jig on the force plate [m].
+        seed: Of everything else that is random with a robot: sensor noise, sampling planners.
     """
 
     X_PDrawn: RigidTransform
@@ -41,23 +41,23 @@ class Disturbance:
     seed: int
 
     @staticmethod
-    def draw(config: CellConfig, rng: np.random.Generator) -> Disturbance:
-        """Draw one."""
+    def draw(config: CellConfig, rng: np.random.Generator) -> TrialDisturbance:
+        """Return random errors with the standard deviations of the configuration."""
         push = config.push
         angles = rng.normal(scale=np.deg2rad(push.grasp_angle_sigma_deg), size=3)
         offset = rng.normal(scale=push.grasp_position_sigma, size=3)
         jig = rng.normal(scale=push.jig_position_sigma, size=2)
         seed = int(rng.integers(1 << 20))
-        return Disturbance(RigidTransform(RollPitchYaw(angles), offset), jig, seed)
+        return TrialDisturbance(RigidTransform(RollPitchYaw(angles), offset), jig, seed)
 
     def displaced(self, X_WJ: RigidTransform) -> RigidTransform:
-        """Return where the jig really stands."""
+        """Return the true pose of a jig whose nominal pose is X_WJ."""
         p_WJ = X_WJ.translation() + np.array([*self.jig_offset, 0.0])
         return RigidTransform(X_WJ.rotation(), p_WJ)
 
 
 class Clock(Protocol):
-    """What a trial reads of a simulation, the rig's or the cell's."""
+    """The clock of a simulation, of the rig or the cell."""
 
     @property
     def time(self) -> float:
@@ -71,40 +71,40 @@ class Clock(Protocol):
 
 
 class Hand(Protocol):
-    """A hand at work in one trial; its methods are called in this order.
+    """The hand of one trial; its methods are called in this order.
 
-    Any of them may raise `PhaseFailed`, a verdict on the trial, also where no motion can be found.
+    Each may raise `PhaseFailed`, a verdict on the trial, also if no motion can be found.
     """
 
     @property
     def observer(self) -> Observer:
-        """Looks at part and jig, and records."""
+        """Observer of part and jig."""
         ...
 
     @property
     def planned(self) -> RigidTransform:
-        """X_JP over the jig as aimed at, with the lowest point `HOVER` above the bag."""
+        """Nominal X_JP over the jig, with the lowest point `HOVER` above the bag."""
         ...
 
     @property
     def simulation(self) -> Clock:
-        """What the hand works in."""
+        """The simulation of the trial."""
         ...
 
     def press(self) -> None:
-        """Bring the part to the jig, press it in and freeze the bag; the part stays in the hand."""
+        """Press the part into the bag and freeze it; the part stays in the grasp."""
         ...
 
     def let_go(self) -> None:
-        """Release the part and back off."""
+        """Release the part and retreat."""
         ...
 
     def approach(self, line: PushLine) -> None:
-        """Bring the closed hand to the start of a push; part and jig sleep and then wake."""
+        """Move the closed hand to the start of a push; part and jig sleep during the motion."""
         ...
 
     def push(self, line: PushLine) -> None:
-        """Push along the line, with a dead stop at its end."""
+        """Push along the line, with an abrupt stop at its end."""
         ...
 
     def wait(self, phase: str, seconds: float) -> None:
@@ -113,26 +113,26 @@ class Hand(Protocol):
 
 
 class Bench(Protocol):
-    """Where trials of one posture are run, again and again."""
+    """Setup for repeated trials of one posture."""
 
-    def begin(self, disturbance: Disturbance) -> Hand:
-        """Put everything in its place for a new trial."""
+    def begin(self, disturbance: TrialDisturbance) -> Hand:
+        """Set up a new trial."""
         ...
 
 
 @dataclass
-class Trial:
-    """What happened.
+class TrialRecord:
+    """The record of one trial; poses that were not reached are None.
 
     Attributes:
-        planned: Pose of the part over the jig before it is pressed in, as aimed at.
-        held: Its pose when the bag had frozen, in the hand.
-        placed: Its pose after the hand had left; None if it did not get so far.
-        speed: Of the part then [m/s].
-        before, after: Pose of the jig around the push, in W.
-        last_jig: Pose of the jig at the end, whatever happened.
-        moved: Pose of the part on the jig at the end.
-        failure: The phase that failed and why; None if all phases ran.
+        planned: Nominal X_JP of the part over the jig, before it is pressed in.
+        held: X_JP in the grasp when the bag has frozen.
+        placed: X_JP after the hand has left.
+        speed: Of the part at that time [m/s].
+        before, after: X_WJ of the jig before and after the push.
+        last_jig: X_WJ of the jig at the end of the trial, also after a failure.
+        moved: X_JP of the part at the end of the trial.
+        failure: The phase that failed and the evidence; None if all phases ran.
         log: Arrays of the trial.
         sim_seconds, cpu_seconds: Simulated time, and CPU time spent stepping [s].
     """
@@ -154,7 +154,15 @@ class Trial:
 def planned_pose(
     part: Part, posture: Posture, X_WJ: RigidTransform, height: float, yaw: float = 0.0
 ) -> RigidTransform:
-    """Return X_WP: upright, centre of mass over the jig, lowest point at a height over J [m]."""
+    """Return X_WP with the posture's axis up and the centre of mass over the jig.
+
+    Args:
+        part: The part.
+        posture: Its posture.
+        X_WJ: Of the jig.
+        height: Of the lowest point over J [m].
+        yaw: About the vertical [rad].
+    """
     R_WP = upright(posture.up, yaw)
     points = part.mesh.vertices @ R_WP.matrix().T
     centre = R_WP @ part.mesh.center_mass
@@ -179,52 +187,47 @@ Watch = Callable[[str, Observer], None]
 
 
 def ignore(event: str, observer: Observer) -> None:
-    """Watch nothing."""
+    """Ignore the event."""
 
 
-def run_trial(hand: Hand, push: Push | None, watch: Watch = ignore) -> Trial:
-    """Place the part and, if asked, push it.
+def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> TrialRecord:
+    """Place the part and push it.
 
     Args:
-        hand: At the beginning of a trial.
-        push: None: only place.
-        watch: Told of the events "placed", "before", "after" and "end".
+        hand: Of a new trial.
+        push: The push; None only places the part.
+        watch: Called at the events "placed", "before", "after" and "end".
     """
-    trial, seen = Trial(planned=hand.planned), hand.observer
+    trial, observer = TrialRecord(planned=hand.planned), hand.observer
     try:
-        _place(hand, trial, SETTLE_TIME if push is None else REST_TIME)
-        watch("placed", seen)
+        hand.press()
+        trial.planned, trial.held = hand.planned, observer.X_JP
+        hand.let_go()
+        hand.wait("settle", SETTLE_TIME if push is None else REST_TIME)
+        trial.placed, trial.speed = observer.X_JP, observer.speed
+        watch("placed", observer)
         if push is not None:
             _push(hand, push, trial, watch)
     except PhaseFailed as error:
         trial.failure = (error.phase, error.evidence)
-    watch("end", seen)
-    trial.moved, trial.last_jig = seen.X_JP, seen.X_WJ
-    trial.log = seen.log.arrays()
+    watch("end", observer)
+    trial.moved, trial.last_jig = observer.X_JP, observer.X_WJ
+    trial.log = observer.log.arrays()
     clock = hand.simulation
     trial.sim_seconds, trial.cpu_seconds = clock.time, clock.stepping_cpu
     return trial
 
 
-def _place(hand: Hand, trial: Trial, settle: float) -> None:
-    seen = hand.observer
-    hand.press()
-    trial.planned, trial.held = hand.planned, seen.X_JP
-    hand.let_go()
-    hand.wait("settle", settle)
-    trial.placed, trial.speed = seen.X_JP, seen.speed
-
-
-def _push(hand: Hand, push: Push, trial: Trial, watch: Watch) -> None:
-    """Bring the closed hand beside the part, push, and let everything coast."""
-    seen = hand.observer
-    line = push_line(seen.stage, seen.root, push, seen.X_WJ, seen.X_WP)
+def _push(hand: Hand, push: PushSpec, trial: TrialRecord, watch: Watch) -> None:
+    """Move the closed hand to the start of the push, push, and let the jig coast."""
+    observer = hand.observer
+    line = push_line(observer.stage, observer.root, push, observer.X_WJ, observer.X_WP)
     hand.approach(line)
     hand.wait("ready", READY_TIME)
-    seen.tare_hand()  # In free air: when the trial began, a jaw may have touched the part.
-    trial.before = seen.X_WJ
-    watch("before", seen)
+    observer.tare_hand()  # In free air: at the start of the trial a jaw may have touched the part.
+    trial.before = observer.X_WJ
+    watch("before", observer)
     hand.push(line)
     hand.wait("coast", COAST_TIME)
-    trial.after = seen.X_WJ
-    watch("after", seen)
+    trial.after = observer.X_WJ
+    watch("after", observer)

@@ -1,4 +1,4 @@
-"""What one trial of the place and push experiments is judged by."""
+"""Measurements and success criteria of a trial of the place and push experiments."""
 
 from __future__ import annotations
 
@@ -7,44 +7,44 @@ from pydrake.math import RigidTransform
 from scipy.ndimage import uniform_filter1d
 
 from experiments.paper.camera import seen_displacement
-from experiments.paper.trial import HOVER, Trial
+from experiments.paper.trial import HOVER, TrialRecord
 from planning.operations.measures import angle_between
 from planning.operations.record import Measured
 
 SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
-UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], read as this tilt [A].
-AT_REST = 1e-3  # [m/s] [A] a part that creeps faster has not come to rest.
-SMOOTHING = 0.01  # [s] A force plate's amplifier smooths over about this long [A].
-VISIBLE = 0.2  # A peak below this share of the placing peak does not stand out in a plot [A].
+UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], interpreted as this tilt [A].
+AT_REST = 1e-3  # [m/s] [A] a part that creeps faster is not at rest.
+SMOOTHING = 0.01  # [s] Averaging time of a typical force plate amplifier [A].
+VISIBLE = 0.2  # A peak below this fraction of the placing peak is not visible in a plot [A].
 
 
 def smoothed(values: np.ndarray, time: np.ndarray) -> np.ndarray:
-    """Return (n,) values averaged over `SMOOTHING`."""
+    """Return values (n,) averaged over `SMOOTHING`."""
     period = float(np.median(np.diff(time))) if len(time) > 1 else SMOOTHING
     return uniform_filter1d(values, max(1, round(SMOOTHING / period)))
 
 
-def plate_forces(trial: Trial) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return time [s], F_n = |f_z| and F_s = hypot(f_x, f_y) [N], less the jig's own weight."""
+def plate_forces(trial: TrialRecord) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return time [s], F_n = |f_z| and F_s = hypot(f_x, f_y) [N] without the weight of the jig."""
     time, force = trial.log["time"], trial.log["force_plate"][:, 3:]
     normal, shear = np.abs(force[:, 2]), np.hypot(force[:, 0], force[:, 1])
     return time, smoothed(normal, time), smoothed(shear, time)
 
 
-def start_of(trial: Trial, phase: str) -> float | None:
-    """Return when a phase began [s]; None if it did not."""
+def start_of(trial: TrialRecord, phase: str) -> float | None:
+    """Return the start time of a phase [s]; None if it did not run."""
     starts = dict(zip(trial.log["phase_name"], trial.log["phase_start"], strict=True))
     return float(starts[phase]) if phase in starts else None
 
 
 def tilt_between(X_JA: RigidTransform, X_JB: RigidTransform) -> float:
-    """Return the angle between what points up in A and in B [rad]."""
+    """Return the angle between the vertical as seen in A and in B [rad]."""
     up_A, up_B = (X.rotation().matrix()[2] for X in (X_JA, X_JB))
     return float(np.arccos(np.clip(up_A @ up_B, -1.0, 1.0)))
 
 
-def measure_place(trial: Trial) -> Measured:
-    """Return how the part stands after it was let go, and what the press took."""
+def measure_place(trial: TrialRecord) -> Measured:
+    """Return depth, offset, tilt and speed of the released part, and the peak press forces."""
     measured: Measured = {}
     if trial.placed is not None:
         drop = trial.planned.translation() - trial.placed.translation()
@@ -63,8 +63,8 @@ def measure_place(trial: Trial) -> Measured:
     return measured
 
 
-def measure_push(trial: Trial) -> Measured:
-    """Return how far the jig went, how the part turned on it, and the forces."""
+def measure_push(trial: TrialRecord) -> Measured:
+    """Return the displacement of the jig, the rotation of the part on it, and the peak forces."""
     begun = start_of(trial, "push") if "time" in trial.log else None
     if begun is None or trial.before is None:
         return {}
@@ -92,24 +92,24 @@ def measure_push(trial: Trial) -> Measured:
 
 
 def force_peaks(time: np.ndarray, force: np.ndarray, begun: float) -> int:
-    """Return how many peaks a plot of the plate's force shows: that of placing, that of pushing.
+    """Return the number of visible peaks of the plate force: of placing, and of pushing.
 
     Args:
         time: (n,) [s].
-        force: (n,) size of the force [N].
-        begun: When the push began [s]; the force just before it is that at rest.
+        force: (n,) magnitude of the force [N].
+        begun: Start of the push [s]; the force just before it is that at rest.
     """
     placing, pushing = force[time < begun], force[time >= begun]
     rest = placing[-1]
     return 1 + int(pushing.max() - rest >= VISIBLE * (placing.max() - rest))
 
 
-def place_succeeded(trial: Trial, measured: Measured) -> bool:
-    """Return whether the part stands upright and at rest."""
+def place_succeeded(trial: TrialRecord, measured: Measured) -> bool:
+    """Return whether the part is upright and at rest."""
     stood = trial.failure is None and trial.placed is not None
     return stood and measured["tilt_rad"] < UPRIGHT and measured["speed_m_per_s"] < AT_REST
 
 
 def push_succeeded(measured: Measured) -> bool:
-    """Return whether the jig went along, by the paper's limit."""
+    """Return whether the jig moved along with the part, by the paper's limit."""
     return measured.get("displacement_m", 0.0) > SUCCESS_DISTANCE

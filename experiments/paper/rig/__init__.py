@@ -1,4 +1,4 @@
-"""One part on the jig, as the paper's experiments see it: what is looked at and recorded.
+"""One part on the jig in the paper's experiments: the observed stage, its record, and the rig.
 
-A hand on a carriage, the rig, stands in for the arm; strokes are for either hand.
+The rig, a hand on a carriage, replaces the arm.
 """

@@ -1,8 +1,8 @@
-"""A hand on a carriage over the soft jig, which slides freely on the force plate.
+"""A hand on a carriage over the fixture, whose base slides freely on the force plate.
 
-The rig is the cell without its arms: the same gripper model, the same jig, force plate and parts.
-A carriage with five driven joints carries the hand: three slides, a turn about the vertical and a
-tilt. It stands in for an arm whose path is given: its drives follow stiffly up to stated forces.
+The rig is the cell without its arms: the same gripper model, jig, force plate and parts. A carriage
+with five driven joints carries the hand: three slides, a turn about the vertical and a tilt. It
+replaces an arm with a prescribed path: its drives follow stiffly up to stated forces.
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ from cell.workpieces.parts import add_parts
 from experiments.paper.rig.stage import Stage
 
 # Drives of the carriage: stiffness, damping and largest effort; slides [N/m, N s/m, N], turn and
-# tilt [N m/rad, N m s/rad, N m]. Stiffness and damping are those of the left arm's hand at the jig,
-# from the drives of its joints: 37 to 49 kN/m, 3.3 to 5.0 kN m/rad [D]; the efforts are [A].
+# tilt [N m/rad, N m s/rad, N m]. Stiffness and damping are those of the hand of the left arm at the
+# jig, from its joint drives: 37 to 49 kN/m, 3.3 to 5.0 kN m/rad [D]; the efforts are [A].
 SLIDE_DRIVE = (4.5e4, 1e3, 200.0)
 TURN_DRIVE = (5e3, 60.0, 30.0)
 LINK_MASS = 2.0  # Of each slide [kg] [A].
@@ -52,10 +52,10 @@ CARRIAGE_JOINTS = ("x", "y", "z", "turn", "tilt")
 
 @dataclass(frozen=True)
 class HandPose:
-    """Where the carriage puts the hand.
+    """A pose of the hand that the carriage can take.
 
     Attributes:
-        p_WT: (3,) position of the frame between the tip pads, T [m].
+        p_WT: (3,) position of the frame T between the tip pads [m].
         turn: About the vertical [rad]; at 0 the jaws close along x of W.
         tilt: 0 with the hand pointing down, pi/2 with it pointing along -y of the turned carriage
             and the recessed jaws above the tip pads [rad].
@@ -87,14 +87,14 @@ class HandPose:
 
 @dataclass(frozen=True)
 class Rig(Stage):
-    """Handles to a built rig; holding it keeps everything alive that a simulation needs.
+    """Handles to a built rig; it owns everything that a simulation needs.
 
     Attributes:
-        diagram: Plain Drake.
+        diagram: Drake's.
         drive: Targets of the carriage: x, y, z [m], turn, tilt [rad].
         carriage: Its model instance.
         hand_length: From the carriage to T [m].
-        sleeper: Puts part and base to sleep.
+        sleeper: Locks part and base while they are at rest.
         monitor: Of the diagram.
     """
 
@@ -113,13 +113,13 @@ class Rig(Stage):
     def set_up(
         self, root: Context, X_WJ: RigidTransform, X_WP: RigidTransform, q: np.ndarray
     ) -> None:
-        """Put everything in its place in a new Context, the part held by a stand.
+        """Set the initial state in a new Context, with the part on a stand.
 
         Args:
             root: Context of the diagram.
-            X_WJ: Where the jig stands on the force plate.
-            X_WP: Where the stand holds the part (it keeps the pose until `let_part_go`).
-            q: (5,) where the carriage is.
+            X_WJ: Of the jig on the force plate.
+            X_WP: Of the part, which is fixed to the stand until `let_part_go`.
+            q: (5,) joint positions of the carriage.
         """
         self.monitor.initialize(root)
         context = self.plant.GetMyMutableContextFromRoot(root)
@@ -130,7 +130,7 @@ class Rig(Stage):
         self.drive.set_target(root, q, np.zeros(len(q)))
 
     def let_part_go(self, root: Context) -> None:
-        """Take the stand away."""
+        """Remove the stand."""
         self.part.joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
 
 
@@ -138,9 +138,9 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     """Build the rig for one part, with the fixture that the configuration names.
 
     Args:
-        config: Of the cell; the jig's base is free whatever it says.
-        product: Where the part is described.
-        part: Its name.
+        config: Of the cell; the base of the jig is free in any case.
+        product: With the part.
+        part: Name of the part.
     """
     config = config.with_changes({"workcell.jig_base_fixed": False})
     builder = DiagramBuilder()

@@ -1,4 +1,4 @@
-"""Steps a rig: hand along given paths, jaws, bag, stand; forces and poses are recorded."""
+"""Simulation of a rig: commands to hand, jaws and fixture; forces and poses are recorded."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from planning.operations.stroke import Stroke
 
 @dataclass(frozen=True)
 class Path:
-    """Joint targets of the carriage over time, from rest.
+    """Joint targets of the carriage over time, starting from rest.
 
     Attributes:
-        at: Returns positions (5,) and rates (5,) for a time [s].
-        duration: After which the end is held, at rest [s].
+        at: Returns positions (5,) and rates (5,) at a time [s].
+        duration: After which the end position is held [s].
     """
 
     at: Callable[[float], tuple[np.ndarray, np.ndarray]]
@@ -31,9 +31,14 @@ class Path:
 
 
 def smooth_path(q0: np.ndarray, q1: np.ndarray, speed: float) -> Path:
-    """Return the straight joint path from rest to rest whose fastest slide has a mean speed.
+    """Return the straight joint path from rest to rest with a mean speed of the fastest slide.
 
-    A turn counts as a slide at a lever of 0.1 m.
+    A rotation counts as a slide at a lever arm of 0.1 m.
+
+    Args:
+        q0: (5,) start.
+        q1: (5,) end.
+        speed: [m/s].
     """
     way = float(np.max(np.abs(q1 - q0) * np.array([1.0, 1.0, 1.0, 0.1, 0.1])))
     duration = max(way / speed, 0.05)
@@ -46,7 +51,7 @@ def smooth_path(q0: np.ndarray, q1: np.ndarray, speed: float) -> Path:
 
 
 def stroke_path(q0: np.ndarray, q1: np.ndarray, speed: float, acceleration: float) -> Path:
-    """Return the straight path of a push: speeding up evenly, with a dead stop at its end."""
+    """Return the straight path of a push: uniform acceleration [m/s2], then an abrupt stop."""
     way = float(np.linalg.norm((q1 - q0)[:3]))
     direction = (q1 - q0) / way
     stroke = Stroke(way, speed, acceleration)
@@ -63,13 +68,13 @@ class RigSimulation:
 
     Args:
         rig: A built rig.
-        X_WJ: Where the jig stands.
-        X_WP: Where the stand holds the part.
-        pose: Where the hand is.
+        X_WJ: Initial pose of the jig.
+        X_WP: Initial pose of the part, on the stand.
+        pose: Initial pose of the hand.
 
     Attributes:
         root: Context of the diagram.
-        observer: Records it.
+        observer: Of part and jig.
         stepping_cpu: CPU seconds spent stepping so far.
     """
 
@@ -100,7 +105,7 @@ class RigSimulation:
     # Commands.
 
     def begin(self, name: str) -> None:
-        """Start a phase; failures and the log carry its name."""
+        """Start a phase; the log and failures name it."""
         self.observer.begin(name, self.time)
 
     def jaws(self, opening: float, force: float = 0.0) -> None:
@@ -108,46 +113,56 @@ class RigSimulation:
         self.rig.gripper.command(self.root, opening, force)
 
     def press_with_part(self) -> None:
-        """Let the fixture receive the part."""
+        """Tell the fixture to receive the part."""
         self.rig.fixture.receive(self.root, self.rig.part.body, self.rig.part.part.mesh)
 
     def fix(self) -> None:
-        """Let the fixture begin to hold the part."""
+        """Tell the fixture to begin to hold the part."""
         self.rig.fixture.fix(self.root)
 
     @property
     def fixed(self) -> bool:
-        """Whether the fixture holds as firmly as it will."""
+        """Whether the fixture holds at its full strength."""
         return self.rig.fixture.fixed(self.root)
 
     def sleep(self) -> None:
-        """Let part and jig rest as they are: nothing touches them, so nothing is computed."""
+        """Lock part and jig in place while nothing touches them, to save computation."""
         self.rig.sleeper.put_to_sleep(self.root, self.rig.part.body)
         self.rig.jig_base.sleep(self.root)
 
     def wake(self) -> None:
-        """Let part and jig move again."""
+        """Release part and jig."""
         self.rig.jig_base.wake(self.root)
         self.rig.sleeper.wake(self.root, self.rig.part.body)
 
     def wait(self, seconds: float) -> None:
-        """Hold everything."""
+        """Step without new commands [s]."""
         for _ in range(round(seconds / self.time_step)):
             self.step()
 
     def move(self, goal: HandPose, speed: float) -> None:
-        """Take the hand to a pose; the mean speed is that of the fastest slide [m/s]."""
+        """Move the hand to a pose; the mean speed is that of the fastest slide [m/s]."""
         start, self.pose = self.rig.joints(self.pose), goal
         self.follow(smooth_path(start, self.rig.joints(goal), speed))
 
     def push(self, goal: HandPose, speed: float, acceleration: float) -> None:
-        """Take the hand straight to a position, with a dead stop at the end."""
+        """Move the hand straight to a pose, with an abrupt stop at the end."""
         start, self.pose = self.rig.joints(self.pose), goal
         self.follow(stroke_path(start, self.rig.joints(goal), speed, acceleration))
 
     def lower(self, speed: float, farthest: float, force: float) -> bool:
-        """Lower the hand until it is pushed up with a force [N]; return whether that happened."""
-        start, hanging = self.pose, self.observer.latest[5]  # The part's weight is in the reading.
+        """Lower the hand until the upward force on it reaches a limit.
+
+        Args:
+            speed: [m/s].
+            farthest: Largest distance [m].
+            force: Limit [N].
+
+        Returns:
+            Whether the limit was reached.
+        """
+        start = self.pose
+        hanging = self.observer.latest[5]  # The reading includes the weight of the part.
         for k in range(1, round(farthest / speed / self.time_step) + 1):
             depth = speed * k * self.time_step
             self.pose = HandPose(start.p_WT - [0, 0, depth], start.turn, start.tilt)
@@ -169,17 +184,18 @@ class RigSimulation:
     # Stepping.
 
     def step(self) -> None:
-        """Advance plant and bag by one step and record it.
+        """Advance the simulation by one step and record it.
 
         Raises:
-            PhaseFailed: The part dropped off, the solver failed or the state is not finite.
+            PhaseFailed: The part fell off, the fixture cannot hold its imprint, the solver failed
+                or the state is not finite.
         """
         start = time.process_time()
         self.steps += 1
         try:
             self.simulator.AdvanceTo(self.time)
         except RunFailure as error:
-            # An imprint that the bag cannot hold is a verdict on the trial.
+            # An imprint that cannot be meshed is a verdict on the trial.
             raise self.observer.failure(str(error)) from error
         except RuntimeError as error:
             raise self.observer.failure(f"solver failure: {str(error).splitlines()[0]}") from error

@@ -1,4 +1,4 @@
-"""A part and the jig, as a trial sees them whatever hand is at work; and what it records."""
+"""The stage of a trial, part, jig and hand of either kind, and the observer that records it."""
 
 from __future__ import annotations
 
@@ -19,24 +19,24 @@ from cell.simulation.log import Log
 from cell.simulation.phase import PhaseFailed
 from cell.workpieces.parts import LoosePart
 
-# A part this far below the top of the jig's base, or this far from its axis, has dropped off [m].
+# A part this far below the top of the jig's base, or this far from its axis, has fallen off [m].
 DROPPED_BELOW, DROPPED_BESIDE = 0.02, 0.12
 RECORD_PERIOD = 2e-3  # [s] A force plate samples at 500 Hz or more [A].
 
 
 @dataclass(frozen=True)
 class Stage:
-    """Handles to what a trial looks at.
+    """Handles to the bodies and sensors of a trial.
 
     Attributes:
-        config: What it was built from.
-        plant, scene_graph: Plain Drake.
+        config: Of the cell.
+        plant, scene_graph: Drake's.
         jig_base: The base, free on the force plate.
         fixture: On the base.
         part: The part to place.
         surface: (n, 3) points of its surface, in its frame [m].
-        gripper: The hand's jaws; frame "tip" of its model is T, between the tip pads.
-        wrist: Wrench between the hand and what carries it.
+        gripper: The jaws; the frame "tip" of the model is T, between the tip pads.
+        wrist: Wrench between the hand and its carrier.
         force_plate: Wrench under the force plate.
     """
 
@@ -53,18 +53,18 @@ class Stage:
 
 
 class Observer:
-    """Looks at a running stage and records it.
+    """Observes and records a stage during a trial.
 
     Args:
-        stage: What to look at.
+        stage: To observe.
         root: Context of the diagram.
 
     Attributes:
         stage, root: As given.
         context: Context of the plant.
         recording: Whether a row is added to the log every `RECORD_PERIOD`.
-        log: Poses, and wrenches less their reading at the latest `tare`.
-        latest: (12,) the latest of these wrenches, of wrist and force plate [N m, N].
+        log: Poses, and wrenches relative to the latest `tare`.
+        latest: (12,) latest of these wrenches, of wrist and force plate [N m, N].
     """
 
     def __init__(self, stage: Stage, root: Context) -> None:
@@ -89,7 +89,7 @@ class Observer:
 
     @property
     def X_JP(self) -> RigidTransform:
-        """Pose of the part on the jig."""
+        """Pose of the part relative to the jig."""
         return self.X_WJ.InvertAndCompose(self.X_WP)
 
     @property
@@ -98,22 +98,26 @@ class Observer:
         return float(np.linalg.norm(self.stage.part.velocity(self.context)[3:]))
 
     def begin(self, phase: str, time: float) -> None:
-        """Note that a phase starts; failures and the log carry its name."""
+        """Start a phase; the log and failures name it."""
         self.log.phases.append((phase, time))
 
     def tare(self) -> None:
-        """Take the present readings of both wrench sensors for zero."""
+        """Zero both wrench sensors at their present readings."""
         self._tare = self._readings()
 
     def tare_hand(self) -> None:
-        """Take the present reading of the hand's wrench sensor for zero."""
+        """Zero the wrist sensor at its present reading."""
         self._tare[:6] = self._readings()[:6]
 
     def step(self, steps: int, time: float) -> None:
-        """Record, if it is time, after a step.
+        """Record the step if a record is due.
+
+        Args:
+            steps: Number of the step.
+            time: [s].
 
         Raises:
-            PhaseFailed: The part dropped off, or the state is not finite.
+            PhaseFailed: The part fell off, or the state is not finite.
         """
         if self.recording and steps % self._record_every == 0:
             self._record(time, self._readings() - self._tare)
@@ -140,4 +144,4 @@ class Observer:
             force_plate=wrenches[6:],
         )
         if p_JP[2] < -DROPPED_BELOW or np.hypot(p_JP[0], p_JP[1]) > DROPPED_BESIDE:
-            raise self.failure(f"'{self.stage.part.part.name}' dropped off the jig")
+            raise self.failure(f"'{self.stage.part.part.name}' fell off the jig")
