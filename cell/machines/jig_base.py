@@ -13,9 +13,8 @@ from pydrake.multibody.tree import RigidBody, SpatialInertia, UnitInertia
 from pydrake.systems.framework import Context
 
 from cell.configuration.config import CellConfig
+from cell.fixtures.jig_dimensions import BASE_DIAMETER, BASE_HEIGHT, BEAD_MASS
 from cell.sleep import Sleep
-
-BEAD_MASS = 0.45  # [kg] [S]; the model of the jig's base is without them.
 
 
 @dataclass(frozen=True)
@@ -76,10 +75,11 @@ class JigBase:
 
 def _inertia(config: CellConfig) -> SpatialInertia:
     """Return base and beads about J: a disc below it and a ball of the same volume above."""
-    diameter, height = 0.160, 0.025  # Of the base [S], [A].
-    base = SpatialInertia.SolidCylinderWithMass(
-        config.push.jig_mass - BEAD_MASS, diameter / 2, height, np.array([0.0, 0.0, 1.0])
-    ).Shift(np.array([0.0, 0.0, height / 2]))
+    mass, radius = config.push.jig_mass - BEAD_MASS, BASE_DIAMETER / 2
+    disc = SpatialInertia.SolidCylinderWithMass(
+        mass, radius, BASE_HEIGHT, np.array([0.0, 0.0, 1.0])
+    )
+    base = disc.Shift(0.5 * BASE_HEIGHT * up)
     bag = config.jig.bag
     radius = (0.75 * bag.volume / np.pi) ** (1 / 3)
     p_JB = np.array([0.0, 0.0, 0.4 * bag.cap_height])  # Centroid of the cap, nearly [D].
