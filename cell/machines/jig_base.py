@@ -75,10 +75,8 @@ class JigBase:
 
 def _inertia(config: CellConfig) -> SpatialInertia:
     """Return base and beads about J: a disc below it and a ball of the same volume above."""
-    mass, radius = config.push.jig_mass - BEAD_MASS, BASE_DIAMETER / 2
-    disc = SpatialInertia.SolidCylinderWithMass(
-        mass, radius, BASE_HEIGHT, np.array([0.0, 0.0, 1.0])
-    )
+    mass, up = config.push.jig_mass - BEAD_MASS, np.array([0.0, 0.0, 1.0])
+    disc = SpatialInertia.SolidCylinderWithMass(mass, BASE_DIAMETER / 2, BASE_HEIGHT, up)
     base = disc.Shift(0.5 * BASE_HEIGHT * up)
     bag = config.jig.bag
     radius = (0.75 * bag.volume / np.pi) ** (1 / 3)
