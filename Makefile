@@ -70,14 +70,16 @@ $(INSTALLED): requirements.lock pyproject.toml
 	$(BIN)/pip install -e . --no-deps
 	@touch $@
 
-# Pictures without a display need these two; without them everything else works.
-RENDER_PACKAGES := libegl1 libgl1-mesa-dri
+# Drake needs the first of these; pictures without a display need the other two. Newer Debians
+# provide libglib2.0-0 by a package of another name, which apt-get finds.
+SYSTEM_PACKAGES := libglib2.0-0 libegl1 libgl1-mesa-dri
 system:
-	@if dpkg -s $(RENDER_PACKAGES) >/dev/null 2>&1; then \
+	@if ldconfig -p | grep -q libglib-2.0.so.0 && ldconfig -p | grep -q libEGL.so.1 && \
+	    dpkg -s libgl1-mesa-dri >/dev/null 2>&1; then \
 	  true; \
-	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && \
-	    apt-get update -qq && apt-get install -y -qq --no-install-recommends $(RENDER_PACKAGES); then \
+	elif [ "$$(id -u)" = 0 ] && command -v apt-get >/dev/null && apt-get update -qq && \
+	    apt-get install -y -qq --no-install-recommends $(SYSTEM_PACKAGES); then \
 	  true; \
 	else \
-	  echo "For pictures in the report install: $(RENDER_PACKAGES)"; \
+	  echo "Install $(SYSTEM_PACKAGES): the first for Drake, the others for pictures in the report"; \
 	fi
