@@ -12,7 +12,6 @@ from cell.errors import RunFailure, UnknownName
 from cell.machines.arms import ARM_MODELS, ArmModel
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
-from planning.motion.kinematics import solve_ik, tool_pose
 from planning.motion.paths import NoPath, plan_line, plan_path
 from planning.motion.timing import JointMotion, NoTiming, time_path
 
@@ -35,14 +34,9 @@ def reach(
 ) -> np.ndarray:
     arm = model.arms[name]
     X_WT = RigidTransform(TOOL_DOWN, p_WT)
-    return solve_ik(
-        arm,
-        model.context,
-        arm.frame(frame),
-        X_WT,
-        near=arm.home if near is None else near,
-        is_free=lambda q: model.is_free(name, q),
-    )
+    near = arm.home if near is None else near
+    ways = arm.configurations(model.context, arm.frame(frame), X_WT, near)
+    return next(q for q in ways if model.is_free(name, q))
 
 
 def timed(model: CollisionModel, path: JointPath, **changes: float) -> JointMotion:
@@ -165,11 +159,11 @@ def test_line_is_straight_and_ends_at_the_goal(model: CollisionModel) -> None:
     q_start = reach(model, "left", "tip", [0.0, 0.15, 0.32])
     X_WGoal = RigidTransform(RollPitchYaw(np.pi, 0.0, 0.5), [0.05, 0.15, 0.24])
     path = plan_line(arm, model.context, tip, q_start, X_WGoal)
-    end = tool_pose(arm, model.context, tip, path.waypoints[-1])
+    end = arm.tool_pose(model.context, tip, path.waypoints[-1])
     assert end.IsNearlyEqualTo(X_WGoal, 1e-6)
     direction = np.array([0.05, 0.0, -0.08]) / np.linalg.norm([0.05, 0.0, -0.08])
     for q in timed(model, path).q[::10]:
-        offset = tool_pose(arm, model.context, tip, q).translation() - [0.0, 0.15, 0.32]
+        offset = arm.tool_pose(model.context, tip, q).translation() - [0.0, 0.15, 0.32]
         aside = offset - direction * (offset @ direction)
         assert np.linalg.norm(aside) < 5e-5
 
@@ -275,21 +269,15 @@ def test_every_arm_with_every_gripper_plans_and_times_its_way(kind: ArmModel, gr
     arm = model.arms["left"]
     tip = arm.frame("tip")
     assert model.is_free("left", arm.home), model.collisions("left", arm.home)
-    X_WHome = tool_pose(arm, model.context, tip, arm.home)
+    X_WHome = arm.tool_pose(model.context, tip, arm.home)
     X_WOver = RigidTransform(X_WHome.rotation(), X_WHome.translation() + [0.0, 0.15, 0.0])
-    q_over = solve_ik(
-        arm,
-        model.context,
-        tip,
-        X_WOver,
-        near=arm.home,
-        is_free=lambda q: arm.model.is_regular(q) and model.is_free("left", q),
-    )
+    ways = arm.configurations(model.context, tip, X_WOver, arm.home)
+    q_over = next(q for q in ways if arm.model.is_regular(q) and model.is_free("left", q))
     assert np.abs(q_over - arm.home).max() < 1.0
     path = plan_path(model, "left", arm.home, q_over, seed=0, max_iterations=1000)
     down = RigidTransform(X_WHome.rotation(), X_WOver.translation() - [0.0, 0.0, 0.05])
     line = plan_line(arm, model.context, tip, q_over, down)
-    assert tool_pose(arm, model.context, tip, line.waypoints[-1]).IsNearlyEqualTo(down, 1e-6)
+    assert arm.tool_pose(model.context, tip, line.waypoints[-1]).IsNearlyEqualTo(down, 1e-6)
     speed = SPEED * np.array([link.speed for link in kind.links])
     for motion in (timed(model, path), timed(model, line)):
         assert motion.q.shape[1] == kind.dof

@@ -15,7 +15,6 @@ from experiments.paper.rig.rig import SLIDE_DRIVE, TURN_DRIVE
 from experiments.paper.robot_hand import RobotBench, RobotHand
 from experiments.paper.trial import TrialDisturbance, run_trial
 from experiments.paper.trial_metrics import tilt_between
-from planning.motion.kinematics import tool_pose
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import reachable_grasps
 from planning.operations.placement import YAWS, pose_on_jig
@@ -89,9 +88,9 @@ def test_hand_follows_the_line_at_the_speed_of_the_stroke_and_stops_dead() -> No
     for t in (0.05, 0.2, line.stroke.duration):
         q, v = motion.at(t)
         distance, speed = line.stroke.at(t)
-        X_WT = tool_pose(arm, seen.context, frame, q)
+        X_WT = arm.tool_pose(seen.context, frame, q)
         assert X_WT.IsNearlyEqualTo(line.at(distance), 1e-5)
-        later = tool_pose(arm, seen.context, frame, q + 1e-4 * v)
+        later = arm.tool_pose(seen.context, frame, q + 1e-4 * v)
         moved = (later.translation() - X_WT.translation()) / 1e-4
         assert moved == pytest.approx(speed * line.direction, abs=1e-3)
 

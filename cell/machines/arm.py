@@ -12,6 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import (
     Frame,
@@ -23,8 +24,9 @@ from pydrake.multibody.tree import (
 from pydrake.systems.framework import Context, DiagramBuilder
 
 from cell.configuration.config import ArmConfig
-from cell.errors import InputError
+from cell.errors import InputError, RunFailure
 from cell.machines.arms import ArmModel
+from cell.machines.arms.base import LIMIT_MARGIN
 from cell.machines.drive import ArmDrive, NamedPorts
 from cell.machines.driver import Driver
 from cell.machines.gripper import Gripper
@@ -36,6 +38,18 @@ from cell.paths import model_url, new_parser
 TORQUE_MODE_DAMPING = 0.3
 
 Tool = Gripper | Driver
+
+
+class Unreachable(RunFailure):
+    """A pose that no acceptable joint configuration reaches, with the reason."""
+
+    def __init__(self, arm: str, frame: str, X_WT: RigidTransform, reason: str) -> None:
+        place = ", ".join(f"{value:.3f}" for value in X_WT.translation())
+        turn = ", ".join(f"{a:.0f}" for a in np.rad2deg(RollPitchYaw(X_WT.rotation()).vector()))
+        super().__init__(
+            f"The {arm} arm cannot bring frame '{frame}' to ({place}) m, "
+            f"roll-pitch-yaw ({turn}) deg: {reason}."
+        )
 
 
 @dataclass(frozen=True)
@@ -125,6 +139,70 @@ class Arm:
         for name in ("desired_state", "torque"):
             inputs[f"{self.name}.{name}"] = self.drive.GetInputPort(name)
         return inputs, outputs | {f"{self.name}.wrench": wrench}
+
+    # Kinematics. The joints of the tool count as they are in the plant's context.
+
+    @property
+    def joint_limits(self) -> tuple[np.ndarray, np.ndarray]:
+        """Lower and upper joint limits (n,) [rad] with `LIMIT_MARGIN` taken off."""
+        lower = np.array([joint.position_lower_limits()[0] for joint in self.joints])
+        upper = np.array([joint.position_upper_limits()[0] for joint in self.joints])
+        return lower + LIMIT_MARGIN, upper - LIMIT_MARGIN
+
+    def tool_pose(self, plant_context: Context, frame: Frame, q: np.ndarray) -> RigidTransform:
+        """Return X_WT of a frame of the tool with the arm at ``q`` (n,) [rad]."""
+        X_WB, X_FT = self._ends(plant_context, frame)
+        return X_WB @ self.model.flange_pose(q) @ X_FT
+
+    def configurations(
+        self, plant_context: Context, frame: Frame, X_WT: RigidTransform, near: np.ndarray
+    ) -> list[np.ndarray]:
+        """Return the joint angles (n,) that put a tool frame at a pose, nearest to ``near`` first.
+
+        Every joint whose range allows it is turned by full circles to be as close to ``near`` as
+        its limits allow; solutions that cannot keep `LIMIT_MARGIN` from the limits are left out.
+
+        Args:
+            plant_context: Of the plant.
+            frame: Any frame T fixed to the flange or to the tool.
+            X_WT: Where it shall be.
+            near: (n,) joint angles [rad].
+        """
+        X_WB, X_FT = self._ends(plant_context, frame)
+        X_BF = X_WB.inverse() @ X_WT @ X_FT.inverse()
+        turned = [self._nearest_turn(q, near) for q in self.model.inverse(X_BF, near)]
+        inside = [q for q in turned if q is not None]
+        return sorted(inside, key=lambda q: float(np.linalg.norm(q - near)))
+
+    def reach(
+        self, plant_context: Context, frame: Frame, X_WT: RigidTransform, near: np.ndarray
+    ) -> np.ndarray:
+        """Return the first of the `configurations` (n,), whatever is in the way.
+
+        Raises:
+            Unreachable: There is none.
+        """
+        for q in self.configurations(plant_context, frame, X_WT, near):
+            return q
+        raise Unreachable(self.name, frame.name(), X_WT, "out of reach or beyond the joint limits")
+
+    def _ends(self, context: Context, frame: Frame) -> tuple[RigidTransform, RigidTransform]:
+        """Return X_WB of the base and X_FT of a tool frame on the flange."""
+        base = self.plant.GetFrameByName(self.model.base_frame, self.instance)
+        flange = self.plant.GetFrameByName(self.model.flange_frame, self.instance)
+        return base.CalcPoseInWorld(context), frame.CalcPose(context, flange)
+
+    def _nearest_turn(self, q: np.ndarray, near: np.ndarray) -> np.ndarray | None:
+        """Return q plus full turns: as near as the limits allow, or None where they do not."""
+        lower, upper = self.joint_limits
+        candidates = q + 2 * np.pi * np.array([-2, -1, 0, 1, 2])[:, None]
+        allowed = (candidates >= lower) & (candidates <= upper)
+        if not allowed.any(axis=0).all():
+            return None
+        distance = np.where(allowed, abs(candidates - near), np.inf)
+        return candidates[distance.argmin(axis=0), np.arange(len(q))]
+
+    # Commands.
 
     def hold_here(self, root: Context) -> None:
         """Switch to the position drive, with the target where the arm is."""

@@ -1,1 +1,1 @@
-"""How an arm gets somewhere: kinematics, collisions, paths, timing."""
+"""How an arm gets somewhere: collisions, paths, timing."""

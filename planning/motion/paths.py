@@ -14,10 +14,9 @@ from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context
 
 from cell.errors import RunFailure
-from cell.machines.arm import Arm
+from cell.machines.arm import Arm, Unreachable
 from planning.motion.collision_model import EDGE_STEP, CollisionModel
 from planning.motion.joint_path import JointPath
-from planning.motion.kinematics import Unreachable, ik_solutions, joint_limits, tool_pose
 
 CORNER_RADIUS = 0.15  # Rounding of the corners of a planned path [rad] [A].
 SHORTCUTS = 100  # Attempts to shorten a planned path [A].
@@ -94,12 +93,12 @@ def plan_line(
         Unreachable: A point of the line is out of reach.
         NoPath: The joints would have to jump, or a point is not acceptable.
     """
-    X_WStart = tool_pose(arm, context, frame, q_start)
+    X_WStart = arm.tool_pose(context, frame, q_start)
     waypoints = [q_start]
     poses = straight_line(X_WStart, X_WGoal)
     for i, X_WT in enumerate(poses):
         where = f"at {100 * (i + 1) / len(poses):.0f} % of the straight line of '{frame.name()}'"
-        solutions = ik_solutions(arm, context, frame, X_WT, waypoints[-1])
+        solutions = arm.configurations(context, frame, X_WT, waypoints[-1])
         if not solutions:
             raise Unreachable(arm.name, frame.name(), X_WT, f"out of reach {where}")
         jump = np.abs(solutions[0] - waypoints[-1])
@@ -136,7 +135,7 @@ def _search(
     max_iterations: int,
 ) -> np.ndarray:
     """Return (n, dof) waypoints found by RRT-Connect, near the endpoints if possible."""
-    limits = joint_limits(model.arms[arm])
+    limits = model.arms[arm].joint_limits
     ends = np.array([q_start, q_goal])
     for margin in (NEIGHBOURHOOD, np.inf):
         lower = np.minimum(np.maximum(limits[0], ends.min(axis=0) - margin), ends.min(axis=0))

@@ -9,10 +9,10 @@ from enum import Enum
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.machines.arm import Unreachable
 from cell.machines.grippers import GripperModel
 from cell.products.product import Grasp
 from cell.simulation.phase import Guard, Jaw, Outcome, Phase, Sensed, after, motion_finished
-from planning.motion.kinematics import Unreachable
 from planning.operations.look import look
 from planning.operations.station import Station
 

@@ -11,8 +11,8 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cell.machines.arm import Unreachable
 from planning.feasibility.directions import rotation_with_up
-from planning.motion.kinematics import Unreachable, ik_solutions
 from planning.motion.paths import NoPath, plan_line
 from planning.operations.grasping import Reach, backed_off
 from planning.operations.station import Placement, Station
@@ -106,7 +106,7 @@ def _leaves(station: Station, reach: Reach, X_WJaw: RigidTransform, q: np.ndarra
     arm, context = station.holder, station.context
     frame = arm.frame(reach.grasp.jaw)
     try:
-        for q_at in ik_solutions(arm, context, frame, X_WJaw, q)[:1]:
+        for q_at in arm.configurations(context, frame, X_WJaw, q)[:1]:
             plan_line(arm, context, frame, q_at, backed_off(X_WJaw, RETREAT))
             return True
     except (Unreachable, NoPath):

@@ -12,11 +12,10 @@ from pydrake.systems.framework import Context
 
 from cell.builder import Cell
 from cell.configuration.config import CellConfig
-from cell.machines.arm import Arm
+from cell.machines.arm import Arm, Unreachable
 from cell.products.product import Part
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
-from planning.motion.kinematics import Unreachable, ik_solutions, tool_pose
 from planning.motion.paths import plan_line, plan_path
 from planning.motion.timing import JointMotion, time_path
 from planning.operations.planning_copy import collision_model
@@ -178,7 +177,7 @@ class Station:
             clearance: Least distance to what is not a robot [m]; None: the configured one.
         """
         self.model.arrange(self.surroundings(may_touch, clearance))
-        solutions = ik_solutions(arm, self.context, frame, X_WF, near)
+        solutions = arm.configurations(self.context, frame, X_WF, near)
         return [q for q in solutions if arm.model.is_regular(q) and self.model.is_free(arm.name, q)]
 
     def configuration(
@@ -250,7 +249,7 @@ class Station:
         """
         q_start = arm.positions(self.context) if q_start is None else q_start
         path = plan_line(arm, self.context, frame, q_start, X_WGoal)
-        start = tool_pose(arm, self.context, frame, q_start)
+        start = arm.tool_pose(self.context, frame, q_start)
         distance = float(np.linalg.norm(X_WGoal.translation() - start.translation()))
         motion = self._timed(arm, path)
         slower = distance / speed / motion.duration if motion.duration > 0 else 1.0

@@ -8,10 +8,10 @@ from enum import Enum
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.machines.arm import Unreachable
 from cell.products.product import Grasp
 from cell.simulation.events import fix_part, prepare_fixture, receive_part
 from cell.simulation.phase import Phase, after, motion_finished
-from planning.motion.kinematics import Unreachable
 from planning.operations.grasping import (
     Reach,
     jaw_to_part,

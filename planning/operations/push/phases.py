@@ -10,8 +10,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.interpolate import CubicSpline
 
+from cell.machines.arm import Unreachable
 from cell.simulation.phase import Jaw, Phase, motion_finished
-from planning.motion.kinematics import Unreachable, tool_pose
 from planning.motion.paths import NoPath, plan_line
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import HAND_SPEED
@@ -161,7 +161,7 @@ def _stroke(station: Station, q_start: np.ndarray, line: PushLine) -> JointMotio
     """
     arm, stroke = station.holder, line.stroke
     frame = arm.frame("tip")
-    X_WT = tool_pose(arm, station.context, frame, q_start)
+    X_WT = arm.tool_pose(station.context, frame, q_start)
     goal = RigidTransform(X_WT.rotation(), X_WT.translation() + stroke.way * line.direction)
     path = plan_line(
         arm,

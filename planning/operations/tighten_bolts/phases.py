@@ -14,9 +14,9 @@ from enum import Enum
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cell.machines.arm import Unreachable
 from cell.simulation.phase import Follow, Outcome, Phase, Sensed, Spin, after, motion_finished
 from cell.workpieces.thread import BIT_SEAT
-from planning.motion.kinematics import Unreachable
 from planning.motion.timing import JointMotion
 from planning.operations.counter_hold import hold, park
 from planning.operations.grasping import backed_off, let_go, raised
