@@ -28,7 +28,7 @@ from cell.products.joints import Screw
 from cell.workpieces.thread import Engagement, ThreadState
 
 Command = Callable[[Cell, Context], None]
-Story = Mapping[int, Command]  # What is commanded before a step, by the number of the step.
+Story = dict[int, Command]  # What is commanded before a step, by the number of the step.
 Snapshot = dict[str, np.ndarray]
 
 QUICK = CellConfig.load(overrides=["jig.vacuum.time_constant=0.05"])  # Jams in 0.15 s.
@@ -147,7 +147,7 @@ def catch_bolt(cell: Cell, root: Context) -> None:
     cell.parts.wake(root, "bolt_1")
     X_WF = thread.thread_frame.CalcPoseInWorld(context)
     cell.plant.SetFreeBodyPose(context, thread.bolt, X_WF)
-    cell.driver.tool.command(root, 5.0)
+    cell.screwdriver.command(root, 5.0)
     cell.threads.set(root, "bolt_1", Engagement(ThreadState.CAUGHT))
 
 

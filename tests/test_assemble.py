@@ -1,7 +1,7 @@
 """The assembly run: what it writes, how it fails, that it repeats, that it can be interrupted."""
 
 import json
-from collections.abc import Iterator
+from collections.abc import Generator, Iterator
 from dataclasses import replace
 from enum import Enum
 from pathlib import Path
@@ -58,8 +58,7 @@ class MadeUp(Enum):
 
 def job(out: Path, **changes: Any) -> Job:
     """Return a quiet assembly run."""
-    given = dict(product=PRODUCT, order=None, config=CONFIG, seed=0, out=out, quiet=True)
-    return Job(**given | changes)
+    return replace(Job(PRODUCT, None, CONFIG, 0, out, quiet=True), **changes)
 
 
 def result_in(out: Path) -> dict[str, Any]:
@@ -224,12 +223,12 @@ def test_riders_are_planned_and_weighed_with_what_carries_them(run: Run) -> None
     assert station.in_hand == ()
 
 
-def some_phases(run: Run, count: int) -> Iterator[Phase]:
+def some_phases(run: Run, count: int) -> Generator[Phase, Outcome, None]:
     """Yield the first phases of placing the motor."""
     pending = PLACE.phases(run.station)
     outcome: Outcome | None = None
     for _ in range(count):
-        outcome = yield next(pending) if outcome is None else pending.send(outcome)  # type: ignore
+        outcome = yield next(pending) if outcome is None else pending.send(outcome)
 
 
 def test_same_seed_is_bit_identical(run: Run) -> None:
@@ -249,8 +248,7 @@ def test_same_seed_is_bit_identical(run: Run) -> None:
 def placed(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return the folder of a run that has placed the motor."""
     out = tmp_path_factory.mktemp("placed")
-    job = Job(PRODUCT, None, CONFIG, 0, out, quiet=True, command="pick_place", last=PICK_PLACE)
-    assert run_job(job) == 0
+    assert run_job(job(out, command="pick_place", last=PICK_PLACE)) == 0
     return out
 
 
@@ -308,7 +306,7 @@ def energies_at_rest(state: Path) -> list[float]:
 
     Every part is awake, in the tray and on the jig.
     """
-    simulation, _ = running_cell(PRODUCT, CONFIG, seed=0)
+    simulation, *_ = running_cell(PRODUCT, CONFIG, seed=0)
     restore_state(simulation, read_state(state))
     parts = list(simulation.cell.parts)
     awake = frozenset(part.part.name for part in parts)

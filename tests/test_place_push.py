@@ -91,7 +91,7 @@ def test_part_that_falls_over_is_a_failure_with_a_full_report(tmp_path: Path) ->
 def case_with(label: str, displacements: list[float]) -> CaseResult:
     push = PUSHES[label]
     trials = [
-        TrialResult(d > 0.063, {"displacement_m": d}, None, TrialRecord(planned=None))  # type: ignore
+        TrialResult(d > 0.063, {"displacement_m": d}, None, TrialRecord(planned=None))
         for d in displacements
     ]
     return CaseResult(Case(push.posture, push), trials)

@@ -45,14 +45,14 @@ def test_every_output_is_what_the_handles_read(cell: Cell) -> None:
     for steps in (0, 20):
         root = player.play(steps).root
         context = plant_of(cell, root)
-        tool, jig = cell.holder.tool, cell.fixture.reading(root)
+        driver, jig = cell.screwdriver.read(context), cell.fixture.reading(root)
         expected = {
             "left.wrench": cell.arms["left"].wrist.read(context),
             "right.wrench": cell.arms["right"].wrist.read(context),
             "force_plate": cell.force_plate.read(context),
-            "left_gripper.opening": [tool.read(context).opening],
-            "spindle.torque": [cell.driver.tool.read(context).torque],
-            "spindle.push": [cell.driver.tool.read(context).push],
+            "left_gripper.opening": [cell.gripper.read(context).opening],
+            "spindle.torque": [driver.torque],
+            "spindle.push": [driver.push],
             "jig.pressure": [jig["pressure"]],
             "jig.state": [jig["state"]],
             "motor.pose": cell.parts["motor"].X_WP(context),
@@ -86,9 +86,9 @@ def test_arm_follows_a_desired_state_and_a_torque(cell: Cell) -> None:
 def test_tools_follow_their_ports(cell: Cell) -> None:
     root = told(cell, {"left_gripper.opening": [0.02], "spindle.speed": [5.0]}, 400)
     context = plant_of(cell, root)
-    assert cell.holder.tool.read(context).opening == pytest.approx(0.02, abs=1e-5)
-    assert cell.driver.tool.read(context).speed == pytest.approx(5.0, rel=0.01)
-    assert cell.driver.tool.drive.commanded_speed(root) == 5.0
+    assert cell.gripper.read(context).opening == pytest.approx(0.02, abs=1e-5)
+    assert cell.screwdriver.read(context).speed == pytest.approx(5.0, rel=0.01)
+    assert cell.screwdriver.drive.commanded_speed(root) == 5.0
 
 
 def test_commands_of_another_size_are_one_line(cell: Cell) -> None:
@@ -102,11 +102,11 @@ def test_commands_of_another_size_are_one_line(cell: Cell) -> None:
 
 def test_grip_force_is_added_behind_the_opening(cell: Cell) -> None:
     """It moves the target of the driven finger, as the handle's command does."""
-    drive = cell.holder.tool.drive
+    drive = cell.gripper.drive
     root = told(cell, {"left_gripper.opening": [0.02], "left_gripper.force": [10.0]}, 1)
     by_port = drive.desired(drive.GetMyContextFromRoot(root))
     root = told(cell, {}, 0)
-    cell.holder.tool.command(root, 0.02, 10.0)
+    cell.gripper.command(root, 0.02, 10.0)
     np.testing.assert_array_equal(drive.desired(drive.GetMyContextFromRoot(root)), by_port)
 
 
@@ -169,7 +169,8 @@ def test_callers_forces_are_added_to_the_cells() -> None:
     builder = DiagramBuilder()
     cell = add_cell(builder, QUICK, PRODUCT)
     body = cell.parts["motor"].body
-    lift = applied_force(body.index(), body.default_com(), SpatialForce(np.zeros(3), [0, 0, 5.0]))
+    F_W = SpatialForce(np.zeros(3), np.array([0.0, 0.0, 5.0]))
+    lift = applied_force(body.index(), body.default_com(), F_W)
     source = builder.AddSystem(ConstantValueSource(AbstractValue.Make([lift])))
     cell.ports.connect(builder, source.get_output_port(), "external_forces")
     cell = cell.with_diagram(builder.Build())
@@ -202,7 +203,7 @@ def test_what_cannot_be_connected_is_one_line() -> None:
 
 
 def test_unknown_ports_are_named_with_the_known_ones(cell: Cell) -> None:
-    source = ConstantVectorSource([0.0]).get_output_port()
+    source = ConstantVectorSource(np.zeros(1)).get_output_port()
     with pytest.raises(
         UnknownName, match="'left.torqe'.*Did you mean 'left.torque'.*spindle.speed"
     ):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder
@@ -11,8 +12,10 @@ from stories import (
     JIG_STEPS,
     JIG_STORY,
     QUICK,
+    Command,
     Player,
     Snapshot,
+    Story,
     add_box,
     assert_same,
     catch_bolt,
@@ -33,8 +36,8 @@ from cell.fixtures.soft_jig.mesh.tet_mesh import BadMesh
 from cell.workpieces.thread import ThreadState
 
 PRODUCT = small_product("motor", "plate", "bolt_1")
-ARM_STORY = {0: relax_arm, 60: stiffen_arm, 80: relax_arm}
-BOLT_STORY = {0: move_arm, 20: catch_bolt}
+ARM_STORY: Story = {0: relax_arm, 60: stiffen_arm, 80: relax_arm}
+BOLT_STORY: Story = {0: move_arm, 20: catch_bolt}
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +53,7 @@ def pressed(cell: Cell) -> Snapshot:
 
 def with_other_systems(builder: DiagramBuilder) -> None:
     """Add systems of a caller's that make the simulator step at other times than the plant."""
-    source = builder.AddSystem(ConstantVectorSource([1.0]))
+    source = builder.AddSystem(ConstantVectorSource(np.ones(1)))
     hold = builder.AddSystem(ZeroOrderHold(0.0003, 1))
     builder.Connect(source.get_output_port(), hold.get_input_port())
     builder.Connect(hold.get_output_port(), builder.AddSystem(Integrator(1)).get_input_port())
@@ -110,10 +113,17 @@ def test_two_cells_in_one_diagram_do_not_meet(cell: Cell, pressed: Snapshot) -> 
     simulator.set_monitor(both)
     other.monitor.initialize(simulator.get_mutable_context())
     other.parts.sleep_all_but(simulator.get_mutable_context(), ())
-    arms = {k: lambda _, root, act=act: act(other, root) for k, act in ARM_STORY.items()}
-    acts = {k: [s[k] for s in (JIG_STORY, arms) if k in s] for k in JIG_STORY | arms}
-    story = {k: lambda c, root, now=now: [act(c, root) for act in now] for k, now in acts.items()}
-    root = Player(one, story, simulator).play(JIG_STEPS).root
+
+    def act(step: int) -> Command:
+        def command(_: Cell, root: Context) -> None:
+            for each, story in ((one, JIG_STORY), (other, ARM_STORY)):
+                if step in story:
+                    story[step](each, root)
+
+        return command
+
+    together = {step: act(step) for step in JIG_STORY | ARM_STORY}
+    root = Player(one, together, simulator).play(JIG_STEPS).root
     assert_same(snapshot(one, root), pressed)
     alone = Player(cell, ARM_STORY).play(JIG_STEPS)
     assert_same(snapshot(other, root), snapshot(cell, alone.root))
@@ -153,6 +163,7 @@ def test_a_cloned_context_goes_on_alike(cell: Cell, pressed: Snapshot, at: int) 
 
 def test_a_context_that_is_reset_begins_anew(cell: Cell, pressed: Snapshot) -> None:
     player = Player(cell, JIG_STORY | {20: relax_arm, 30: catch_bolt}).play(470)
+    assert cell.diagram is not None
     cell.diagram.SetDefaultContext(player.root)
     player.root.SetTime(0.0)
     again = Player(cell, JIG_STORY, player.simulator).play(JIG_STEPS)

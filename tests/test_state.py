@@ -49,8 +49,8 @@ def under_way(cell: Cell) -> Simulation:
     """Return a run with motor and bolt awake, the jaws closing, the spindle turning, a soft bag."""
     simulation = Simulation(cell)
     cell.parts.sleep_all_but(simulation.root, ["motor", "bolt_3"])
-    cell.holder.tool.command(simulation.root, 0.03, 10.0)
-    cell.driver.tool.command(simulation.root, 20.0)
+    cell.gripper.command(simulation.root, 0.03, 10.0)
+    cell.screwdriver.command(simulation.root, 20.0)
     receive_part("motor")(simulation)
     for _ in range(20):
         simulation.step()

@@ -135,7 +135,7 @@ class TrayAndHand:
         return found
 
     def _owner(self, geometry: GeometryId) -> str:
-        inspector = self.diagram.GetSubsystemByName("scene_graph").model_inspector()  # type: ignore[attr-defined]
+        inspector = self.diagram.GetSubsystemByName("scene_graph").model_inspector()
         body = self.plant.GetBodyFromFrameId(inspector.GetFrameId(geometry))
         assert body is not None
         return self.plant.GetModelInstanceName(body.model_instance())

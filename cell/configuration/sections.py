@@ -5,13 +5,11 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, fields, is_dataclass, replace
-from typing import Any, TypeVar
+from typing import Any
 
 from cell.configuration.frozen_dict import FrozenDict
 from cell.errors import UnknownName
 from cell.setting import BadSetting, Setting, converted
-
-Section = TypeVar("Section")
 
 
 @dataclass(frozen=True)
@@ -63,7 +61,7 @@ def entries(section: Any, path: str = "") -> Iterator[Entry]:
             yield Entry(full, value, setting_of(section, key))
 
 
-def changed(section: Section, changes: Any, path: str = "") -> Section:
+def changed[Section](section: Section, changes: Any, path: str = "") -> Section:
     """Return a section with changes applied and checked.
 
     Args:
