@@ -160,11 +160,6 @@ def add_cell(
     """
     product.check_simulable()
     prefix = f"{name}_" if name else ""
-    if builder.HasSubsystemNamed(f"{prefix}plant"):
-        raise InputError(
-            f"There is a system '{prefix}plant' in the builder already: give each cell a name of "
-            "its own, add_cell(builder, config, product, name=...)."
-        )
     counter = builder.AddNamedSystem(f"{prefix}steps", StepCounter(config.simulation.time_step))
     drives = make_drives(config)
     for arm, own in drives.items():

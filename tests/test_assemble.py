@@ -134,7 +134,7 @@ def run() -> Run:
 
 
 def test_planner_does_not_know_the_disturbance(run: Run) -> None:
-    """Parts are where the tray really is; the planner's tray is where it should be."""
+    """Parts are where the tray really is; the planner keeps the tray's nominal pose."""
     X_WT = Disturbance.draw(CONFIG, 0).applied_to(CONFIG).workcell.X_WT
     part = PRODUCT.parts["motor"]
     assert part.X_TrayP is not None
