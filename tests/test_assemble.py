@@ -32,10 +32,9 @@ from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.insert_shaft import phases as insert_phases
 from planning.operations.insert_shaft.phases import goal_pose
-from planning.operations.operation import Step
+from planning.operations.operation import Step, StepRecord
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.pick_place.phases import PlacePhase
-from planning.operations.record import StepRecord
 from planning.operations.sequence import steps
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.snapshot import take_snapshot

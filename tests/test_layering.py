@@ -1,6 +1,7 @@
 """The shape of the source tree: imports point one way, and no file outgrows a reader."""
 
 import ast
+from graphlib import TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -119,6 +120,18 @@ def test_layers_use_only_those_below(package: str, layer: str) -> None:
     for file in files_of(package, layer):
         beyond = used_of(package, file) - {layer} - LAYERS[package][layer] - EVERYWHERE[package]
         assert not beyond, f"{name_of(file)} uses {sorted(beyond)}"
+
+
+def test_no_file_imports_itself_through_others() -> None:
+    """Not for type checkers only, either. Packages' own `__init__` files only hand names on."""
+    files = {
+        ".".join(f.relative_to(ROOT).with_suffix("").parts): f
+        for package in ALLOWED
+        for f in (ROOT / package).rglob("*.py")
+        if f.name != "__init__.py"
+    }
+    graph = {name: imported_modules(file) & set(files) for name, file in files.items()}
+    TopologicalSorter(graph).prepare()  # Raises CycleError, which names the circle.
 
 
 def test_scripts_use_layers_and_not_each_other() -> None:

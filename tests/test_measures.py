@@ -14,11 +14,10 @@ from planning.operations.bolts import in_hole, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.insert_shaft.measures import riders_standing, seat_errors
-from planning.operations.limits import failed_checks
+from planning.operations.log_rows import rows_between
 from planning.operations.measures import force_plate_peaks, moved
-from planning.operations.operation import Step
+from planning.operations.operation import PhaseRecord, Step, StepRecord
 from planning.operations.pick_place.measures import placement_errors
-from planning.operations.record import PhaseRecord, StepRecord, rows_between
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.set_aside.measures import measure as measure_set_aside
 from planning.operations.set_aside.phases import AsidePhase
@@ -170,16 +169,16 @@ def test_rows_of_an_interval_leave_out_its_start() -> None:
 def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
     insertion = Step("insert plate", INSERT_SHAFT, ("plate",))
     limits = {limit.quantity: limit.limit for limit in INSERT_SHAFT.limits}
-    assert not failed_checks(insertion, limits)
-    (failed,) = failed_checks(insertion, limits | {"gap_m": -1.0})
+    assert not insertion.failed_checks(limits)
+    (failed,) = insertion.failed_checks(limits | {"gap_m": -1.0})
     assert (failed.quantity, failed.value) == ("gap_m", -1.0)
-    (failed,) = failed_checks(insertion, {k: v for k, v in limits.items() if k != "tilt_rad"})
+    (failed,) = insertion.failed_checks({k: v for k, v in limits.items() if k != "tilt_rad"})
     assert (failed.quantity, failed.value) == ("tilt_rad", None)
 
 
 def test_limits_of_bolts_hold_for_each() -> None:
     step = Step("tighten bolts", TIGHTEN_BOLTS, ("bolt_1", "bolt_2"))
-    failed = [check.quantity for check in failed_checks(step, {})]
+    failed = [check.quantity for check in step.failed_checks({})]
     assert {"bolt_1/torque_deviation", "bolt_2/torque_deviation"} <= set(failed)
 
 
@@ -223,10 +222,10 @@ def test_bolts_that_rode_in_are_judged_on_their_threads() -> None:
     }
     assert measured["bolt_1/standing_axial_m"] == pytest.approx(2e-4)
     back = Step("insert plate", INSERT_SHAFT, ("plate",), None, ("bolt_1",))
-    missing = {check.quantity for check in failed_checks(back, {})}
+    missing = {check.quantity for check in back.failed_checks({})}
     assert "bolt_1/standing_axial_m" in missing
     alone = Step("insert plate", INSERT_SHAFT, ("plate",))
-    assert not any("standing" in check.quantity for check in failed_checks(alone, {}))
+    assert not any("standing" in check.quantity for check in alone.failed_checks({}))
 
 
 def test_part_set_aside_is_compared_with_where_it_was_taken_from() -> None:

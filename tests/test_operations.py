@@ -14,7 +14,7 @@ import planning.operations
 from cell.products.joints import JOINT_TYPES, Press
 from cell.products.loading import load_product
 from planning.assembly_plan.planner import plan
-from planning.operations.limits import Limit, failed_checks
+from planning.operations.limits import Limit
 from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.registry import OPERATIONS
 from planning.operations.sequence import steps
@@ -91,5 +91,5 @@ def test_operation_that_is_added_takes_the_steps_of_its_joint(
     assert [step.name for step in todo] == [
         "place motor", "press plate", "place bolts", "tighten bolts",
     ]  # fmt: skip
-    assert [check.quantity for check in failed_checks(todo[1], {})] == ["gap_m"]
+    assert [check.quantity for check in todo[1].failed_checks({})] == ["gap_m"]
     assert todo[1].fixed_after(pressed, ("motor",)) == ("motor", "plate")

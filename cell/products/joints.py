@@ -6,21 +6,31 @@ frozen dataclass with `keys`, `read` and `parts`, added to `JOINT_TYPES`.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, ClassVar
+from typing import Any, ClassVar, Protocol
 
 import numpy as np
 
 from cell.errors import InputError
 from cell.products.fields import Fields, mapping_at, one_of
 
-if TYPE_CHECKING:
-    from cell.products.product import Product
-
 FRICTION_RADIUS_PER_DIAMETER = 0.7
 """[D] (d_w + d_h) / 4 of the head's bearing face (ISO 4762) and the clearance hole (ISO 273,
 medium), over the nominal diameter: 0.71 for M3, 0.67 for M8."""
+
+
+class PartNames(Protocol):
+    """What a joint needs to know of a product: the names of parts and groups."""
+
+    @property
+    def parts(self) -> Mapping[str, Any]:
+        """The parts by name."""
+        ...
+
+    def members(self, item: str) -> tuple[str, ...]:
+        """Return the names of the parts behind a part or group."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -48,7 +58,7 @@ class Fit:
         return self.shaft, self.hole
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> Sequence[Fit]:
+    def read(cls, entry: Fields, product: PartNames) -> Sequence[Fit]:
         """Return the fit that an entry describes."""
         return [cls(**_shaft_in_hole(entry, product))]
 
@@ -76,7 +86,7 @@ class Press:
         return self.shaft, self.hole
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> Sequence[Press]:
+    def read(cls, entry: Fields, product: PartNames) -> Sequence[Press]:
         """Return the press fit that an entry describes."""
         return [cls(**_shaft_in_hole(entry, product), force=entry.positive("force_N"))]
 
@@ -129,7 +139,7 @@ class Screw:
         return self.part, self.into, self.clamps
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> Sequence[Screw]:
+    def read(cls, entry: Fields, product: PartNames) -> Sequence[Screw]:
         """Return the screw that an entry describes; for a group, one for each of its members."""
         screws = [
             cls(
@@ -175,7 +185,7 @@ class Rest:
         return self.part, self.on
 
     @classmethod
-    def read(cls, entry: Fields, product: Product) -> Sequence[Rest]:
+    def read(cls, entry: Fields, product: PartNames) -> Sequence[Rest]:
         """Return the joint that an entry describes; for a group, one for each of its members."""
         on = _part(entry, "on", product)
         return [cls(part, on) for part in product.members(entry.text("part"))]
@@ -187,7 +197,7 @@ JOINT_TYPES: dict[str, type[Joint]] = {"fit": Fit, "screw": Screw, "press": Pres
 """The kinds of joint, by the ``type`` of their entries in a product file."""
 
 
-def read_joints(entries: Iterable[tuple[Any, str]], product: Product) -> tuple[Joint, ...]:
+def read_joints(entries: Iterable[tuple[Any, str]], product: PartNames) -> tuple[Joint, ...]:
     """Return the joints that the entries of a product file describe, in their order.
 
     Args:
@@ -255,11 +265,11 @@ def head_friction(screw: Screw, counter: float | None = None) -> float:
     return float(f"{mu:.6g}")
 
 
-def _part(entry: Fields, key: str, product: Product) -> str:
+def _part(entry: Fields, key: str, product: PartNames) -> str:
     return one_of("part", entry.text(key), product.parts)
 
 
-def _shaft_in_hole(entry: Fields, product: Product) -> dict[str, Any]:
+def _shaft_in_hole(entry: Fields, product: PartNames) -> dict[str, Any]:
     return {
         "shaft": _part(entry, "shaft", product),
         "hole": _part(entry, "hole", product),

@@ -2,49 +2,48 @@
 
 from __future__ import annotations
 
-from cell.simulation.phase import Event
-from cell.simulation.simulation import Simulation
+from cell.simulation.phase import Event, Running
 
 
-def prepare_fixture(simulation: Simulation) -> None:
+def prepare_fixture(running: Running) -> None:
     """Make the fixture ready for a new part: what an earlier one has left is gone."""
-    simulation.cell.fixture.prepare(simulation.root)
+    running.cell.fixture.prepare(running.root)
 
 
 def receive_part(part: str) -> Event:
     """Let a part be put onto the fixture."""
 
-    def event(simulation: Simulation) -> None:
-        loose = simulation.cell.parts[part]
-        simulation.cell.fixture.receive(simulation.root, loose.body, loose.part.mesh)
+    def event(running: Running) -> None:
+        loose = running.cell.parts[part]
+        running.cell.fixture.receive(running.root, loose.body, loose.part.mesh)
 
     return event
 
 
-def fix_part(simulation: Simulation) -> None:
+def fix_part(running: Running) -> None:
     """Let the fixture begin to hold what it has received."""
-    simulation.cell.fixture.fix(simulation.root)
+    running.cell.fixture.fix(running.root)
 
 
-def free_part(simulation: Simulation) -> None:
+def free_part(running: Running) -> None:
     """Let the fixture begin to let go."""
-    simulation.cell.fixture.free(simulation.root)
+    running.cell.fixture.free(running.root)
 
 
 def release_part(part: str) -> Event:
     """Let the fixture forget a part that has been lifted off it."""
 
-    def event(simulation: Simulation) -> None:
-        simulation.cell.fixture.release(simulation.root, simulation.cell.parts[part].body)
+    def event(running: Running) -> None:
+        running.cell.fixture.release(running.root, running.cell.parts[part].body)
 
     return event
 
 
-def rest_jig(simulation: Simulation) -> None:
+def rest_jig(running: Running) -> None:
     """Let the jig's base sleep where it stands."""
-    simulation.cell.jig_base.sleep(simulation.root)
+    running.cell.jig_base.sleep(running.root)
 
 
-def wake_jig(simulation: Simulation) -> None:
+def wake_jig(running: Running) -> None:
     """Let the jig's base move again."""
-    simulation.cell.jig_base.wake(simulation.root)
+    running.cell.jig_base.wake(running.root)

@@ -9,18 +9,17 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from enum import Enum
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import Context
 
+from cell.builder import Cell
 from cell.errors import RunFailure
-
-if TYPE_CHECKING:
-    from cell.machines.driver import DriverReading
-    from cell.machines.gripper import GripperReading
-    from cell.simulation.simulation import Simulation
+from cell.machines.driver import DriverReading
+from cell.machines.gripper import GripperReading
 
 
 class Motion(Protocol):
@@ -122,7 +121,33 @@ class Sensed:
 
 Condition = Callable[[Sensed], bool]
 Guard = Callable[[Sensed], str | None]
-Event = Callable[["Simulation"], None]
+
+
+class Running(Protocol):
+    """What an event acts on: a running cell."""
+
+    @property
+    def cell(self) -> Cell:
+        """The cell."""
+        ...
+
+    @property
+    def root(self) -> Context:
+        """Context of the diagram."""
+        ...
+
+    @property
+    def steps(self) -> int:
+        """Plant steps so far."""
+        ...
+
+    @property
+    def time(self) -> float:
+        """Simulated time [s]."""
+        ...
+
+
+Event = Callable[[Running], None]
 
 
 def motion_finished(sensed: Sensed) -> bool:

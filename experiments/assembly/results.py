@@ -16,7 +16,7 @@ from experiments.reporting.provenance import finite, versions
 from experiments.reporting.report import write_report
 from planning.assembly_plan.plan_file import plan_to_dict
 from planning.assembly_plan.planner import FixingPlan
-from planning.operations.record import Arrays
+from planning.operations.operation import Arrays
 
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 

@@ -15,10 +15,9 @@ from cell.simulation.phase import Outcome, Phase, PhaseFailed
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments.assembly.prepare import Disturbance
-from planning.operations.limits import FailedCheck, failed_checks
+from planning.operations.limits import FailedCheck
 from planning.operations.measures import measure
-from planning.operations.operation import Role, Step
-from planning.operations.record import PhaseRecord, StepRecord
+from planning.operations.operation import PhaseRecord, Role, Step, StepRecord
 from planning.operations.snapshot import take_snapshot
 from planning.operations.station import Station
 
@@ -131,7 +130,7 @@ class Run:
         record.end = take_snapshot(simulation)
         record.placement = station.placements.get(step.parts[0])
         measured = measure(simulation.cell, record, simulation.log.arrays())
-        failed = failed_checks(step, measured) if self.failure is None else ()
+        failed = step.failed_checks(measured) if self.failure is None else ()
         return StepResult(
             step.name,
             step.operation.name,

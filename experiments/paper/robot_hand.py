@@ -21,7 +21,7 @@ from cell.errors import CellError, RunFailure
 from cell.fixtures.soft_jig import SurfaceSamples
 from cell.products.product import Grasp, Product
 from cell.simulation.events import rest_jig, wake_jig
-from cell.simulation.phase import Outcome, Phase, PhaseFailed, after
+from cell.simulation.phase import Outcome, Phase, PhaseFailed, Running, after
 from cell.simulation.simulation import Simulation
 from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
@@ -215,8 +215,8 @@ class RobotHand:
         except CellError as error:
             raise self.observer.failure(str(error)) from error
 
-    def _record(self, simulation: Simulation) -> None:
-        self.observer.step(simulation.steps, simulation.time)
+    def _record(self, running: Running) -> None:
+        self.observer.step(running.steps, running.time)
 
     def _planned(self, yaw: float) -> RigidTransform:
         """Return X_JP over the jig, turned by a yaw."""

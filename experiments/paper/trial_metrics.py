@@ -9,7 +9,7 @@ from scipy.ndimage import uniform_filter1d
 from experiments.paper.camera import seen_displacement
 from experiments.paper.trial import HOVER, TrialRecord
 from planning.operations.measures import angle_between
-from planning.operations.record import Measured
+from planning.operations.operation import Measured
 
 SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
 UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], interpreted as this tilt [A].

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform
 from cell.products.joints import Screw
 from cell.products.product import Product
 from cell.workpieces.thread import Misfit
-from planning.operations.record import Measured
+from planning.operations.operation import Measured
 from planning.operations.snapshot import Snapshot
 
 

@@ -2,14 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
-
-if TYPE_CHECKING:
-    from planning.operations.operation import Step
 
 
 @dataclass(frozen=True)
@@ -29,12 +25,11 @@ class Limit:
     reason: str
     each: str = ""
 
-    def names(self, step: Step) -> list[str]:
-        """Return the measured names that it bounds."""
+    def names(self, parts: Mapping[str, Sequence[str]]) -> list[str]:
+        """Return the measured names that it bounds, given a step's "parts" and "riders"."""
         if not self.each:
             return [self.quantity]
-        parts: tuple[str, ...] = getattr(step, self.each)
-        return [f"{part}/{self.quantity}" for part in parts]
+        return [f"{part}/{self.quantity}" for part in parts[self.each]]
 
 
 @dataclass(frozen=True)
@@ -67,11 +62,19 @@ def standing_limits(each: str) -> tuple[Limit, ...]:
     )
 
 
-def failed_checks(step: Step, measured: Mapping[str, float]) -> tuple[FailedCheck, ...]:
-    """Return every limit of a step's operation that its measured quantities do not keep."""
+def failed_checks(
+    limits: Sequence[Limit], parts: Mapping[str, Sequence[str]], measured: Mapping[str, float]
+) -> tuple[FailedCheck, ...]:
+    """Return every limit that the measured quantities of a step do not keep.
+
+    Args:
+        limits: Of the step's operation.
+        parts: Names of its "parts" and of the "riders" on them.
+        measured: Quantity -> value.
+    """
     failed = []
-    for limit in step.operation.limits:
-        for name in limit.names(step):
+    for limit in limits:
+        for name in limit.names(parts):
             value = measured.get(name)
             if value is None or not abs(value) <= limit.limit:
                 failed.append(FailedCheck(name, value, limit.limit, limit.reason))

@@ -6,7 +6,8 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.builder import Cell
-from planning.operations.record import Arrays, Measured, StepRecord, rows_between
+from planning.operations.log_rows import rows_between
+from planning.operations.operation import Arrays, Measured, StepRecord
 from planning.operations.snapshot import Snapshot
 
 

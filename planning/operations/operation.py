@@ -6,23 +6,25 @@ measured of it, the limits and plots. They are found through `planning.operation
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass, field, replace
 from enum import Enum
-from typing import TYPE_CHECKING
 
+import numpy as np
+from pydrake.math import RigidTransform
+
+from cell.builder import Cell
 from cell.errors import RunFailure
 from cell.products.joints import Joint
 from cell.products.product import Product
 from cell.simulation.phase import Outcome, Phase
-from planning.operations.limits import Limit
+from planning.operations.limits import FailedCheck, Limit, failed_checks
 from planning.operations.plot import Plot
-from planning.operations.record import Arrays, Measured
+from planning.operations.snapshot import Snapshot
+from planning.operations.station import Placement, Station
 
-if TYPE_CHECKING:
-    from cell.builder import Cell
-    from planning.operations.record import StepRecord
-    from planning.operations.station import Station
+Arrays = Mapping[str, np.ndarray]
+Measured = dict[str, float]  # Quantity, with its SI unit in the name -> value.
 
 
 class NoOperation(RunFailure):
@@ -90,6 +92,11 @@ class Step:
         yield from self.operation.carry_out(station, self)
         station.fixed = self.fixed_after(station.cell.product, station.fixed)
 
+    def failed_checks(self, measured: Mapping[str, float]) -> tuple[FailedCheck, ...]:
+        """Return every limit of its operation that its measured quantities do not keep."""
+        parts = {"parts": self.parts, "riders": self.riders}
+        return failed_checks(self.operation.limits, parts, measured)
+
     def fixed_after(self, product: Product, fixed: tuple[str, ...]) -> tuple[str, ...]:
         """Return what the fixture holds after the step; ``fixed``: before it.
 
@@ -97,6 +104,56 @@ class Step:
         """
         before = Scene(product, standing=fixed)
         return tuple(n for n in before.after(self).standing if n not in product.screws)
+
+
+@dataclass(frozen=True)
+class PhaseRecord:
+    """One phase that came to its end.
+
+    Attributes:
+        start, end: The truth before its first and after its last time step.
+        peak_force: By arm name, largest force at its wrist, less the reading at the start [N].
+        awake: Names of the parts that were: nothing acts on a part that sleeps.
+    """
+
+    start: Snapshot
+    end: Snapshot
+    peak_force: Mapping[str, float]
+    awake: frozenset[str] = frozenset()
+
+
+@dataclass
+class StepRecord:
+    """One step of an assembly, up to where it ended, well or not.
+
+    Attributes:
+        step: Which one.
+        start, end: The truth around it.
+        base: Name of the part that the fixture holds; None before one is placed.
+        placed: The truth when it had been placed, or when the run began with it on the fixture.
+        origin: X_WP from which the part that is moved was once taken to the fixture, if it was.
+        placement: Where on the fixture the part that is moved was meant to go, if it was.
+        phases: By subject and kind; each occurs once in a step.
+    """
+
+    step: Step
+    start: Snapshot
+    base: str | None = None
+    placed: Snapshot | None = None
+    origin: RigidTransform | None = None
+    placement: Placement | None = None
+    phases: dict[tuple[str, Enum], PhaseRecord] = field(default_factory=dict)
+    end: Snapshot | None = None
+
+    def of(self, subject: str, *kinds: Enum) -> list[PhaseRecord]:
+        """Return those phases of a subject that ran, in the order of the kinds asked for."""
+        keys = [(subject, kind) for kind in kinds]
+        return [self.phases[key] for key in keys if key in self.phases]
+
+    def last_awake(self, part: str) -> Snapshot | None:
+        """Return the truth at the end of the latest phase in which a part was awake."""
+        ends = [phase.end for phase in self.phases.values() if part in phase.awake]
+        return max(ends, key=lambda end: end.time, default=None)
 
 
 def plans_nothing(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:

@@ -11,8 +11,9 @@ from cell.products.product import Product
 from planning.operations.bolts import standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft.phases import SOFT, InsertPhase
+from planning.operations.log_rows import logged_poses, rows_of
 from planning.operations.measures import base_moved, named_of
-from planning.operations.record import Arrays, Measured, StepRecord, logged_poses, rows_of
+from planning.operations.operation import Arrays, Measured, StepRecord
 from planning.operations.snapshot import Snapshot
 
 

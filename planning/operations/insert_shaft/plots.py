@@ -7,8 +7,8 @@ import numpy as np
 from cell.builder import Cell
 from planning.operations.insert_shaft.measures import fit_of, insertion_curve
 from planning.operations.insert_shaft.phases import SOFT
+from planning.operations.operation import Arrays, StepRecord
 from planning.operations.plot import Plot
-from planning.operations.record import Arrays, StepRecord
 
 
 def plots(cell: Cell, record: StepRecord, log: Arrays) -> list[Plot]:

@@ -7,17 +7,10 @@ from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from planning.operations.grasping import HandPhase
+from planning.operations.log_rows import logged_poses, logged_speed, rows_of
+from planning.operations.operation import Arrays, Measured, PhaseRecord, StepRecord
 from planning.operations.pick_place.phases import PlacePhase
 from planning.operations.placement import upright
-from planning.operations.record import (
-    Arrays,
-    Measured,
-    PhaseRecord,
-    StepRecord,
-    logged_poses,
-    logged_speed,
-    rows_of,
-)
 from planning.operations.snapshot import Snapshot
 
 # What throws a part, by the name that its kick is measured under.

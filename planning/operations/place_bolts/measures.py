@@ -8,8 +8,8 @@ from cell.builder import Cell
 from planning.operations.bolts import in_hole, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.measures import base_moved, named_of
+from planning.operations.operation import Arrays, Measured, StepRecord
 from planning.operations.place_bolts.phases import BoltPhase
-from planning.operations.record import Arrays, Measured, StepRecord
 
 
 def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from cell.builder import Cell
+from planning.operations.operation import Arrays, Measured, StepRecord
 from planning.operations.push.phases import PushPhase
-from planning.operations.record import Arrays, Measured, StepRecord
 
 
 def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:

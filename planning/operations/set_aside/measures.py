@@ -7,7 +7,7 @@ import numpy as np
 from cell.builder import Cell
 from planning.operations.bolts import in_hole
 from planning.operations.measures import angle_between, named_of
-from planning.operations.record import Arrays, Measured, StepRecord
+from planning.operations.operation import Arrays, Measured, StepRecord
 from planning.operations.set_aside.phases import AsidePhase
 
 

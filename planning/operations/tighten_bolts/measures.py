@@ -7,15 +7,9 @@ import numpy as np
 from cell.builder import Cell
 from cell.products.joints import Screw
 from cell.workpieces.thread import Misfit
+from planning.operations.log_rows import logged_poses, rows_of
 from planning.operations.measures import base_moved, named_of
-from planning.operations.record import (
-    Arrays,
-    Measured,
-    PhaseRecord,
-    StepRecord,
-    logged_poses,
-    rows_of,
-)
+from planning.operations.operation import Arrays, Measured, PhaseRecord, StepRecord
 from planning.operations.snapshot import Snapshot
 from planning.operations.tighten_bolts.phases import DRIVEN, DrivePhase
 

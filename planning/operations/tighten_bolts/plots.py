@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 
 from cell.builder import Cell
+from planning.operations.log_rows import rows_of
+from planning.operations.operation import Arrays, StepRecord
 from planning.operations.plot import Plot
-from planning.operations.record import Arrays, StepRecord, rows_of
 from planning.operations.tighten_bolts.measures import thread_curve
 from planning.operations.tighten_bolts.phases import DRIVEN
 
