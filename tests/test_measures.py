@@ -199,13 +199,15 @@ def test_loose_bolt_is_judged_in_the_hole_of_what_it_clamps() -> None:
     """Wherever that is: it stands off, leans about the hole's upper end, or passes beside it."""
     state = snapshot()
     hanging = in_hole(PRODUCT, "bolt_2", state)
-    assert hanging == pytest.approx({"proud_m": 0.0, "off_hole_m": 0.0, "lean_rad": 0.0}, abs=1e-7)
+    assert hanging == pytest.approx(
+        {"protrusion_m": 0.0, "off_hole_m": 0.0, "lean_rad": 0.0}, abs=1e-7
+    )
     # The axis leans by 0.05 about the middle of the hole's upper end, 4 mm below the head.
     lean = RigidTransform(RollPitchYaw(0.05, 0.0, 0.0), np.zeros(3))
     leaning = in_hole(
         PRODUCT, "bolt_2", moved_part(state, "bolt_2", lean @ RigidTransform([0.0, 0.0, 4e-3]))
     )
-    assert leaning["proud_m"] == pytest.approx(4e-3 * np.cos(0.05))
+    assert leaning["protrusion_m"] == pytest.approx(4e-3 * np.cos(0.05))
     assert leaning["off_hole_m"] == pytest.approx(0.0, abs=1e-9)
     assert leaning["lean_rad"] == pytest.approx(0.05)
     beside = in_hole(PRODUCT, "bolt_2", moved_part(state, "bolt_2", RigidTransform([1e-3, 0, 0])))

@@ -294,14 +294,15 @@ def test_nose_grip_leaves_room_for_the_shaft_beside_the_nearest_bolt() -> None:
     query = plant.get_geometry_query_input_port().Eval(plant.GetMyContextFromRoot(context))
     bolt = 0.0155 * np.array([np.cos(np.pi / 3), np.sin(np.pi / 3)])
     p_BoltShaft = np.array([0.0, 0.007]) - bolt
-    rooms = [
-        _room_for_shaft(query, p_BoltShaft, closing) for closing in np.arange(0, np.pi, np.pi / 6)
+    clearances = [
+        _clearance_of_shaft(query, p_BoltShaft, closing)
+        for closing in np.arange(0, np.pi, np.pi / 6)
     ]
-    assert max(rooms) > 0.0005
+    assert max(clearances) > 0.0005
 
 
-def _room_for_shaft(query: QueryObject, p_BoltShaft: np.ndarray, closing: float) -> float:
-    """Return the least room around a shaft d 6 that ends 17 mm above the seated bolt's origin."""
+def _clearance_of_shaft(query: QueryObject, p_BoltShaft: np.ndarray, closing: float) -> float:
+    """Return the clearance around a shaft d 6 that ends 17 mm above the seated bolt's origin."""
     c, s = np.cos(closing), np.sin(closing)
     x, y = c * p_BoltShaft[0] + s * p_BoltShaft[1], -s * p_BoltShaft[0] + c * p_BoltShaft[1]
     nose = 0.1975 + 0.0018  # The bolt's origin, along the approach direction from the mount.

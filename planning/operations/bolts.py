@@ -34,7 +34,7 @@ def in_hole(product: Product, bolt: str, snapshot: Snapshot) -> Measured:
     p_SeatF, axis = X_SeatF.translation(), X_SeatF.rotation().matrix()[:, 2]
     passes = p_SeatF - axis * (p_SeatF[2] / axis[2])
     return {
-        "proud_m": float(p_SeatF[2]),
+        "protrusion_m": float(p_SeatF[2]),
         "off_hole_m": float(np.hypot(passes[0], passes[1])),
         "lean_rad": float(np.arccos(np.clip(axis[2], -1.0, 1.0))),
     }

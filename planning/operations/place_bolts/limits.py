@@ -5,7 +5,7 @@ from planning.operations.limits import BASE_STAYS, CAPTIVE, LEANING, LOOSE, Limi
 IN_HOLE = "3 mm of shank are in the hole at least: what is below it, such as the bed, may lift it"
 LIMITS = (*standing_limits("parts"), *BASE_STAYS)
 LOOSE_LIMITS = (
-    Limit("proud_m", 7e-3, IN_HOLE, each="parts"),
+    Limit("protrusion_m", 7e-3, IN_HOLE, each="parts"),
     Limit("off_hole_m", 5e-4, CAPTIVE, each="parts"),
     Limit("lean_rad", LEANING, LOOSE, each="parts"),
     *BASE_STAYS,
