@@ -12,5 +12,5 @@ ENV PIP_NO_CACHE_DIR=1
 RUN make setup PYTHON=/usr/local/bin/python3.13
 ENV PATH="/soft-jig/.venv/bin:$PATH"
 
-# Another command takes its place: docker run soft-jig soft-jig plan motor_unit --explain
+# Another command takes its place: docker run -v "$PWD/out:/out" soft-jig soft-jig plan motor_unit --explain --out /out
 CMD ["soft-jig", "assemble", "--out", "/out"]

@@ -1,8 +1,8 @@
 """The errors this project raises on purpose: one line names the culprit and the alternatives.
 
 Two kinds, told apart by what a caller does about them: `InputError`, something that was given
-cannot be used and nothing was run (the command line's exit code 2); `RunFailure`, it ran and did
-not come out (exit code 1).
+cannot be used and nothing was run (the command line's exit code 2); `RunFailure`, it ran and
+failed (exit code 1).
 """
 
 from __future__ import annotations

@@ -3,7 +3,6 @@
 The folders are what the scripts share, from the lowest up:
 
 - `reporting`: files, pages, plots, pictures.
-- `metrics`: what an assembly is judged by.
 - `jig`: element tests of the soft jig alone.
 - `plan`, `assembly`: ``soft-jig plan`` and ``soft-jig assemble``.
 - `paper`: its experiments, ``soft-jig place``, ``push`` and ``regress``.

@@ -1,4 +1,4 @@
-"""Contexts of one diagram do not meet; a caller's mistakes are said before Drake gives up."""
+"""Contexts of one diagram are independent; a caller's mistakes are said before Drake gives up."""
 
 import numpy as np
 import pytest

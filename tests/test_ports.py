@@ -111,7 +111,7 @@ def test_grip_force_is_added_behind_the_opening(cell: Cell) -> None:
 
 
 def test_vacuum_port_jams_and_vents(cell: Cell) -> None:
-    """While it has a value, it has the say over the pump."""
+    """While it has a value, it overrides the commands to the pump."""
     assert cell.diagram is not None
     player = Player(cell, {0: press_motor}).play(50)
     vacuum = cell.diagram.GetInputPort("jig.vacuum")

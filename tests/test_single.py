@@ -68,3 +68,12 @@ def test_start_that_cannot_be_read_is_bad_input(
     assert pick_place.main(["--start", str(start), "--out", str(tmp_path / "out")]) == 2
     assert str(start) in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
+
+
+def test_operation_that_the_plan_lacks_is_bad_input(
+    tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """Rather than a run of the whole assembly."""
+    assert operation.main(["set_aside", "--quiet", "--out", str(tmp_path / "out")]) == 2
+    assert "no step with 'set_aside'. Its operations: pick_place," in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()

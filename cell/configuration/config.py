@@ -62,7 +62,7 @@ class CellConfig:
 
         Args:
             name_or_path: A name in ``models/config`` or a YAML file; it may be partial.
-            overrides: Dotted path -> value, or texts such as "simulation.time_step=0.002" and
+            overrides: Dotted path -> value, or texts such as "simulation.time_step=0.0005" and
                 "arms.left.model=ur10e".
 
         Raises:

@@ -1,4 +1,4 @@
 """What works on the product, as handles: arms, their tools, the jig's base, sensors.
 
-The soft jig itself has a package of its own.
+Fixtures are in `cell.fixtures`.
 """

@@ -1,4 +1,4 @@
-"""The whole cell: built as one diagram, and stepped through phases that command it.
+"""Steps a built cell through phases that command it.
 
 What happened is logged, and the state of a run can be saved and restored.
 """

@@ -111,7 +111,7 @@ p_WTip = cell.X_WJ.translation() + [0.0, 0.0, cell.fixture.entry_height + 0.05]
 X_WTip = RigidTransform(RotationMatrix.MakeXRotation(pi), p_WTip)
 X_WF = X_WTip @ RigidTransform([0.0, 0.0, -arm.tool.model.tip_z])
 solutions = arm.model.inverse(arm.config.X_WB.inverse() @ X_WF, near=arm.home)
-print(f"{arm.model.name}: {len(solutions)} ways to reach over the bag")
+print(f"{arm.model.name}: {len(solutions)} inverse-kinematics solutions over the bag")
 arm.tool.command(root, opening=0.03, force=0.0)
 for share in np.linspace(0.0, 1.0, 101):
     q = arm.home + share * (solutions[0] - arm.home)

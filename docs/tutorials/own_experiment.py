@@ -1,7 +1,7 @@
 """Your own experiment: how hard the frozen bag holds a part, over the vacuum.
 
 A box is pressed into the bag with 20 N; the pump draws a vacuum; then it is pulled up, harder and
-harder, until it comes off. Every trial is a new Context of one diagram, so no trial meets another.
+harder, until it comes off. Every trial is a new Context of one diagram, so trials are independent.
 """
 
 import csv

@@ -1,7 +1,7 @@
 """Your own fixture: one class, registered by one line, and the rest of the cell stays as it is.
 
 A magnet plate: what stands on it is drawn down with 40 N while the current is on. What it remembers
-lives in the Context, so that two Contexts of one diagram do not meet.
+lives in the Context, so that two Contexts of one diagram are independent.
 """
 
 import numpy as np

@@ -84,5 +84,5 @@ ends = []
 for simulation in (first, second):
     simulation.run(descend(0.04))
     ends.append(cell.plant.GetPositions(simulation.context))
-print(f"continued alike: {np.array_equal(*ends)}")
+print(f"identical: {np.array_equal(*ends)}")
 assert np.array_equal(*ends)

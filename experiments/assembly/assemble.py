@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from rich.console import Console
 
+from cell.errors import InputError
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import running_cell
@@ -59,10 +60,16 @@ def _steps(job: Job, fixing: FixingPlan) -> list[Step]:
     """Return the steps of a feasible plan, up to the first of the operation wanted last.
 
     Raises:
+        InputError: No step of the plan has the operation wanted last.
         NoOperation: The plan is infeasible, or no operation carries it out.
     """
     if fixing.stop is not None:
         raise NoOperation(stop_text(fixing))
     todo = steps(job.product, fixing)
     operations = [step.operation for step in todo]
-    return todo[: operations.index(job.last) + 1] if job.last in operations else todo
+    if job.last is None:
+        return todo
+    if job.last not in operations:
+        known = ", ".join(dict.fromkeys(operation.name for operation in operations))
+        raise InputError(f"The plan has no step with '{job.last.name}'. Its operations: {known}.")
+    return todo[: operations.index(job.last) + 1]

@@ -36,7 +36,7 @@ class Common:
     overrides: Annotated[
         UseAppendAction[tuple[str, ...]], arg(name="set", metavar="KEY=VALUE")
     ] = ()
-    """Change one value of the configuration, for example simulation.time_step=0.002. Repeatable."""
+    """Change one value of the configuration, for example simulation.time_step=5e-4. Repeatable."""
 
     quiet: bool = False
     """Print nothing but errors."""

@@ -16,6 +16,7 @@ from importlib.metadata import version
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
+import cell
 from cell.errors import InputError, RunFailure, UnknownName
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
@@ -25,6 +26,7 @@ from experiments.cli.plan import Plan
 DESCRIPTION = """\
 A digital twin of a dual-arm assembly cell with a soft jig.
 Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
+--version prints the versions of the twin and of Drake.
 """
 Command = Plan | Assemble | Place | Push | Regress
 COMMANDS: dict[str, type[Command]] = {
@@ -45,7 +47,7 @@ def parse(arguments: Sequence[str]) -> Command:
     """
     command = arguments[0] if arguments else ""
     if command == "--version":
-        print(f"soft-jig {version('soft-jig-cell')}, Drake {version('drake')}")
+        print(f"soft-jig {cell.__version__}, Drake {version('drake')}")
         raise SystemExit(0)
     if not command:
         raise BadUsage(f"A command is missing. Known: {', '.join(COMMANDS)}. See soft-jig --help.")

@@ -51,7 +51,7 @@ class Plan:
     explain: bool = False
     """Also print the matrices, every candidate, and which pair blocks which direction, where."""
 
-    html: bool = True
+    no_html: bool = False
     """Write no plan.html, whose pictures take some seconds."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
@@ -70,7 +70,7 @@ class Plan:
                 self.explain,
                 out,
                 config=config,
-                html=self.html,
+                html=not self.no_html,
             )
 
     def options(self) -> PlanOptions:

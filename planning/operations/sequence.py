@@ -2,7 +2,7 @@
 
 Nothing here knows a product or an operation. The fixture holds the part that the plan says; when
 the plan names another one, what stands on the fixture is set aside as a whole, and brought back to
-the new one. Which operation takes a step, the registry is asked.
+the new one. The registry decides which operation takes a step.
 """
 
 from __future__ import annotations

@@ -40,7 +40,7 @@ class Estimate:
 
 
 class Source(Protocol):
-    """A way to see.
+    """A perception source.
 
     Attributes:
         duration: How long everything has to stand still for a look [s].
@@ -126,7 +126,7 @@ class Belief:
     """The latest estimate of every part that has been seen.
 
     Attributes:
-        source: A way to see.
+        source: A perception source.
         hand: Returns the pose X_WH of the hand now, from the joint encoders.
         estimates: By name of the part.
         carried: By name of a part in the hand, X_WH at the moment its estimate speaks of.
