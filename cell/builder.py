@@ -160,6 +160,7 @@ def add_cell(
     """
     product.check_simulable()
     prefix = f"{name}_" if name else ""
+    _check_names(builder, f"{prefix}steps")
     counter = builder.AddNamedSystem(f"{prefix}steps", StepCounter(config.simulation.time_step))
     drives = make_drives(config)
     for arm, own in drives.items():
@@ -167,8 +168,8 @@ def add_cell(
         builder.AddNamedSystem(f"{prefix}{arm}_drive", own.arm)
         builder.AddNamedSystem(f"{prefix}{own.tool_name}_drive", own.tool)
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
-    plant.set_name(f"{prefix}plant")
-    scene_graph.set_name(f"{prefix}scene_graph")
+    plant.set_name(f"{name or 'cell'}_plant")
+    scene_graph.set_name(f"{name or 'cell'}_scene_graph")
     workcell = add_workcell(plant, config, product.tray)
     if not config.workcell.jig_base_fixed:
         for sliding in (workcell.plate, workcell.base):
@@ -224,14 +225,19 @@ def add_cell(
     )
 
 
-def _check_names(builder: DiagramBuilder) -> None:
-    """Refuse two systems of one name, at which Drake would end the process in `Build`."""
-    names = [system.get_name() for system in builder.GetSystems()]
+def _check_names(builder: DiagramBuilder, *planned: str) -> None:
+    """Refuse two systems of one name, at which Drake would end the process in `Build`.
+
+    Called before the cell adds its systems, with one that every cell has, and after; what has been
+    added cannot be removed again.
+    """
+    names = [*(system.get_name() for system in builder.GetSystems()), *planned]
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise InputError(
-            f"The builder has two systems named {', '.join(twice)}: give the cell a name of its "
-            'own, add_cell(..., name="left_cell"), which becomes their prefix.'
+            f"Two systems of the builder would be named {', '.join(twice)}: give the cell a name "
+            'of its own, add_cell(..., name="left_cell"), which becomes their prefix'
+            f"{'.' if planned else ', in a new builder.'}"
         )
 
 

@@ -81,13 +81,21 @@ class StepCounter(LeafSystem):
             )
 
 
-def join_monitors(*monitors: Monitor) -> Callable[[Context], EventStatus]:
-    """Return one monitor for a diagram with several cells."""
+def join_monitors(
+    *monitors: Callable[[Context], EventStatus | None],
+) -> Callable[[Context], EventStatus]:
+    """Return one monitor that calls several, of cells or of the caller's own, in this order.
+
+    It returns the most severe status of theirs; one that returns None did nothing.
+    """
 
     def monitor(root: Context) -> EventStatus:
+        worst = EventStatus.DidNothing()
         for each in monitors:
-            each(root)
-        return EventStatus.Succeeded()
+            status = each(root)
+            if status is not None and status.severity().value > worst.severity().value:
+                worst = status
+        return worst
 
     return monitor
 
@@ -122,8 +130,18 @@ class Monitor:
 
         `Simulator.Initialize` does it through the monitor; call it yourself before the first
         command to a Context that has no simulator yet.
+
+        Raises:
+            InputError: The Context is not one of the diagram with this monitor's cell.
         """
-        if not self.counter.ready(root):
+        try:
+            ready = self.counter.ready(root)
+        except RuntimeError as error:
+            raise InputError(
+                "This monitor's cell is not in the diagram that is stepped: take the monitor of a "
+                "cell that is."
+            ) from error
+        if not ready:
             self._reset(root)
             self.counter.set_ready(root)
             self.counter.set_seen(root, self.counter.steps_at(root))

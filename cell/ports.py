@@ -44,19 +44,19 @@ class Ports:
 
         Raises:
             InputError: No such input, something is connected to it already, another size or type,
-                or a system that is not in this builder.
+                a system that is not in this builder, or a builder that has built its diagram.
         """
         if name not in self.inputs:
             raise UnknownName("input of the cell", name, self.inputs)
         port = self.inputs[name]
-        if builder.IsConnectedOrExported(port):
-            raise InputError(f"Input '{name}' of the cell is connected already.")
         mine = f"'{source.get_system().get_name()}.{source.get_name()}'"
         if source.get_data_type() != port.get_data_type() or source.size() != port.size():
             raise InputError(
                 f"Input '{name}' of the cell takes {_kind(port)}; {mine} is {_kind(source)}."
             )
         try:
+            if builder.IsConnectedOrExported(port):
+                raise InputError(f"Input '{name}' of the cell is connected already.")
             builder.Connect(source, port)
         except RuntimeError as error:
             reason = str(error).splitlines()[0]
@@ -68,12 +68,18 @@ class Ports:
             raise UnknownName("output of the cell", name, self.outputs)
         return self.outputs[name]
 
-    def export(self, builder: DiagramBuilder) -> None:
-        """Make every port one of the diagram itself, under the same name."""
+    def export(self, builder: DiagramBuilder, prefix: str = "") -> None:
+        """Make every port one of the diagram itself, but for inputs that are connected.
+
+        Args:
+            builder: The cell's, before it builds the diagram.
+            prefix: Of the names, to tell two cells apart.
+        """
         for name, port in self.inputs.items():
-            builder.ExportInput(port, name)
+            if not builder.IsConnectedOrExported(port):
+                builder.ExportInput(port, prefix + name)
         for name, port in self.outputs.items():
-            builder.ExportOutput(port, name)
+            builder.ExportOutput(port, prefix + name)
 
 
 def _kind(port: InputPort | OutputPort) -> str:

@@ -5,10 +5,11 @@ import pytest
 import trimesh
 from pydrake.geometry import Box, Cylinder, ProximityProperties, SceneGraph, Shape
 from pydrake.math import RigidTransform
-from pydrake.multibody.plant import MultibodyPlant
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph, MultibodyPlant
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import Context, DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
+from pydrake.systems.primitives import ConstantVectorSource
 
 from cell import (
     Cell,
@@ -19,6 +20,7 @@ from cell import (
     Simulation,
     add_cell,
     build_cell,
+    join_monitors,
     restore_state,
     save_state,
 )
@@ -62,15 +64,15 @@ def test_torques_in_one_context_and_positions_in_another() -> None:
 def test_two_cells_of_one_name_are_refused() -> None:
     builder = DiagramBuilder()
     add_cell(builder, CellConfig(), EMPTY)
-    with pytest.raises(InputError, match="two systems named .*plant.*name="):
+    with pytest.raises(InputError, match="would be named steps: .*name="):
         add_cell(builder, CellConfig(), EMPTY)
 
 
-def adds(shape: Shape) -> Extend:
+def adds(shape: Shape, mass: float = 0.1) -> Extend:
     """Return what adds a body "mine" for the bag to hold."""
 
     def extend(plant: MultibodyPlant, scene_graph: SceneGraph) -> None:
-        inertia = SpatialInertia.SolidBoxWithMass(0.1, 0.03, 0.03, 0.03)
+        inertia = SpatialInertia.SolidBoxWithMass(mass, 0.03, 0.03, 0.03)
         body = plant.AddRigidBody("mine", plant.AddModelInstance("mine"), inertia)
         touch = ProximityProperties()
         plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "bed_mine", touch)
@@ -87,8 +89,71 @@ def test_a_shape_that_the_bed_cannot_conform_to_is_refused_before_the_press() ->
 
 
 def test_a_state_of_other_bodies_is_refused() -> None:
-    """Drake would end the process over the number of positions."""
-    with_body = build_cell(CellConfig(), EMPTY, extend=adds(Box(0.03, 0.03, 0.03)))
-    without = Simulation(build_cell(CellConfig(), EMPTY))
-    with pytest.raises(InputError):
-        restore_state(without, save_state(Simulation(with_body)))
+    """With none, Drake would end the process over the number of positions."""
+    saved = save_state(
+        Simulation(build_cell(CellConfig(), EMPTY, extend=adds(Box(0.03, 0.03, 0.03))))
+    )
+    for other in (None, adds(Box(0.03, 0.03, 0.04)), adds(Box(0.03, 0.03, 0.03), mass=0.2)):
+        simulation = Simulation(build_cell(CellConfig(), EMPTY, extend=other))
+        with pytest.raises(InputError, match="another set of bodies"):
+            restore_state(simulation, saved)
+
+
+def test_what_the_bag_cannot_hold_is_refused() -> None:
+    """One without hydroelastic properties, one of another plant, one that is part of the cell."""
+    cell, other = (
+        build_cell(CellConfig(), EMPTY, extend=adds(Box(0.03, 0.03, 0.03))) for _ in range(2)
+    )
+    _, root = start(cell)
+    for plant, name, message in (
+        (cell.plant, "mine", "'bed_mine' has no hydroelastic properties"),
+        (other.plant, "mine", "of another plant"),
+        (cell.plant, cell.jig_base.body.name(), "is not free"),
+    ):
+        with pytest.raises(FixtureError, match=message):
+            cell.fixture.receive(root, plant.GetBodyByName(name))
+
+
+def test_callers_own_plant_beside_the_cells() -> None:
+    """Drake gives it the plain names."""
+    builder = DiagramBuilder()
+    cell = add_cell(builder, CellConfig(), EMPTY)
+    plant, _ = AddMultibodyPlantSceneGraph(builder, 1e-3)
+    plant.Finalize()
+    start(cell.with_diagram(builder.Build()))
+
+
+def test_ports_are_exported_but_for_those_that_are_connected() -> None:
+    builder = DiagramBuilder()
+    cells = {name: add_cell(builder, CellConfig(), EMPTY, name=name) for name in ("one", "two")}
+    opening = builder.AddSystem(ConstantVectorSource(np.array([0.02]))).get_output_port()
+    cells["one"].ports.connect(builder, opening, "left_gripper.opening")
+    for name, cell in cells.items():
+        cell.ports.export(builder, f"{name}.")
+    diagram = builder.Build()
+    assert not diagram.HasInputPort("one.left_gripper.opening")
+    assert diagram.HasInputPort("two.left_gripper.opening")
+    with pytest.raises(InputError, match="'left_gripper.opening': .*Build"):
+        cells["two"].ports.connect(builder, opening, "left_gripper.opening")
+
+
+def test_joined_monitors_stop_a_run_as_one_alone_does() -> None:
+    cell = build_cell(CellConfig(), EMPTY)
+    simulator, _ = start(cell)
+
+    def mine(root: Context) -> EventStatus | None:
+        if root.get_time() >= 0.01:
+            return EventStatus.ReachedTermination(cell.plant, "enough")
+        return None
+
+    simulator.set_monitor(join_monitors(cell.monitor, mine))
+    simulator.AdvanceTo(0.05)
+    assert simulator.get_context().get_time() == pytest.approx(0.01)
+
+
+def test_monitor_of_another_cell_is_one_line() -> None:
+    cell, other = (build_cell(CellConfig(), EMPTY) for _ in range(2))
+    simulator = Simulator(cell.diagram)
+    simulator.set_monitor(other.monitor)
+    with pytest.raises(InputError, match="monitor's cell is not in the diagram"):
+        simulator.Initialize()

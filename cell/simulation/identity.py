@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
+from collections.abc import Iterator
 from importlib.metadata import version
 
 import numpy as np
+from pydrake.multibody.tree import BodyIndex
 
 from cell.builder import Cell
 from cell.products.product import Product
@@ -17,10 +20,25 @@ def identity_of(cell: Cell) -> dict[str, str]:
     return {
         "product": f"{cell.product.name} {_digest_of(cell.product)}",
         "configuration": _digest(json.dumps(cell.config.to_dict(), sort_keys=True, default=str)),
-        # A caller may have added some.
-        "set of bodies": _digest("\n".join(cell.plant.GetStateNames())),
+        "set of bodies": _digest("\n".join(_bodies(cell))),
         "Drake": version("drake"),
     }
+
+
+def _bodies(cell: Cell) -> Iterator[str]:
+    """Yield what the plant has: states, masses, shapes, and which contact properties there are."""
+    plant, inspector = cell.plant, cell.scene_graph.model_inspector()
+    context = plant.CreateDefaultContext()
+    yield from plant.GetStateNames()
+    for index in map(BodyIndex, range(plant.num_bodies())):
+        body = plant.get_body(index)
+        inertia = body.CalcSpatialInertiaInBodyFrame(context)
+        yield f"{body.scoped_name()} {inertia.CopyToFullMatrix6()}"
+        for geometry in plant.GetCollisionGeometriesForBody(body):
+            yield f"{inspector.GetName(geometry)} {inspector.GetPoseInFrame(geometry)}"
+            # The same wherever the models lie, and in whatever order Drake lists the properties.
+            yield re.sub(r"'/.*/", "'", repr(inspector.GetShape(geometry)))
+            yield from sorted(str(inspector.GetProximityProperties(geometry)).splitlines())
 
 
 def _digest(text: str) -> str:

@@ -50,7 +50,6 @@ class Simulation:
         context: Context of the plant.
         log: What happened, every ``simulation.log_period``.
         stepping_cpu: CPU seconds spent stepping so far.
-        steps: Plant steps so far.
         wrists: By arm name, the latest reading (6,) [N m, N] of the wrist.
         tare: By arm name, the reading that counts as zero.
     """
@@ -67,7 +66,6 @@ class Simulation:
         self.context = cell.plant.GetMyMutableContextFromRoot(self.root)
         self.log = Log()
         self.stepping_cpu = 0.0
-        self.steps = 0
         cell.monitor.initialize(self.root)
         cell.parts.sleep_all_but(self.root, ())
         self.simulator.Initialize()
@@ -80,8 +78,13 @@ class Simulation:
         return self.cell.config.simulation.time_step
 
     @property
+    def steps(self) -> int:
+        """Plant steps so far, whoever advanced the simulator."""
+        return self.cell.monitor.counter.seen(self.root)
+
+    @property
     def time(self) -> float:
-        """Simulated time [s]."""
+        """Simulated time after the latest step [s]."""
         return self.steps * self.time_step
 
     @cached_property
@@ -92,8 +95,7 @@ class Simulation:
     def step(self) -> None:
         """Advance by one time step of the plant."""
         start = time.process_time()
-        self.steps += 1
-        self.simulator.AdvanceTo(self.time)
+        self.simulator.AdvanceTo((self.steps + 1) * self.time_step)
         self.stepping_cpu += time.process_time() - start
 
     def read_wrists(self) -> dict[str, np.ndarray]:

@@ -1,7 +1,8 @@
 """Save and restore all state of a run: continuing from a restored state is bit-identical.
 
 A saved state is a flat mapping of names to arrays. It also says what it is of: product,
-configuration, bodies and Drake's version; a state of another cell is refused.
+configuration, bodies and Drake's version; and it lists its arrays with their checksums. A state of
+another cell, or one that is not whole, is refused before anything is changed.
 """
 
 from __future__ import annotations
@@ -14,12 +15,12 @@ from zipfile import BadZipFile
 
 import numpy as np
 
-from cell.bodies import full_name
 from cell.errors import InputError
 from cell.simulation.simulation import Simulation
 
 State = dict[str, np.ndarray]
 
+ARRAYS = "of/arrays"  # The list of names and checksums.
 SLASH = "%2F"  # A slash in the name of a part or body, in the path of an array.
 
 
@@ -27,6 +28,8 @@ def save_state(simulation: Simulation) -> State:
     """Return everything that the course of a run depends on as named arrays."""
     cell, root, context = simulation.cell, simulation.root, simulation.context
     bodies = [part.body for part in cell.parts]
+    # A caller's own are among them.
+    free = [cell.plant.get_body(index) for index in cell.plant.GetFloatingBaseBodies()]
     asleep = {part.part.name: np.array(part.asleep(root)) for part in cell.parts}
     state: dict[str, Any] = {
         "of": {name: np.array(value) for name, value in simulation.identity.items()},
@@ -38,11 +41,12 @@ def save_state(simulation: Simulation) -> State:
         "wrist": {name: reading.copy() for name, reading in simulation.wrists.items()},
         "tare": {name: reading.copy() for name, reading in simulation.tare.items()},
         "asleep": asleep | {"jig_base": np.array(cell.jig_base.asleep(root))},
-        "sleep": cell.sleeper.save(root, [*bodies, cell.jig_base.body]),
+        "sleep": cell.sleeper.save(root, [*bodies, *free, cell.jig_base.body]),
         "threads": cell.threads.save(root),
         "fixture": cell.fixture.save(root),
     }
-    return _flat(state)
+    flat = _flat(state)
+    return flat | {ARRAYS: np.array(sorted(_checksums(flat)))}
 
 
 def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
@@ -56,8 +60,8 @@ def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> No
             one.
     """
     _check_identity(simulation, state)
+    _check_arrays(state)
     try:
-        _check_complete(simulation, state)
         _restore(simulation, _nested(state))
     except KeyError as missing:
         raise InputError(f"The saved state lacks {missing}: it is incomplete.") from missing
@@ -83,10 +87,10 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
         drive.restore(root, state["drive"][name])
     simulation.wrists = {name: reading.copy() for name, reading in state["wrist"].items()}
     simulation.tare = {name: reading.copy() for name, reading in state["tare"].items()}
-    simulation.steps = int(state["steps"])
-    cell.sleeper.restore(root, state["sleep"], simulation.time)
-    root.SetTime(simulation.time)
-    cell.monitor.counter.set_seen(root, simulation.steps)
+    steps = int(state["steps"])
+    root.SetTime(steps * simulation.time_step)
+    cell.monitor.counter.set_seen(root, steps)
+    cell.sleeper.restore(root, state["sleep"], root.get_time())
     cell.plant.SetPositions(context, state["q"])
     cell.plant.SetVelocities(context, state["v"])
     simulation.simulator.Initialize()
@@ -99,26 +103,27 @@ def _check_identity(simulation: Simulation, state: Mapping[str, np.ndarray]) -> 
             raise InputError(f"The saved state is of another {what}: {then}, not {now}.")
 
 
-def _check_complete(simulation: Simulation, state: Mapping[str, np.ndarray]) -> None:
-    """Check names, shapes and numbers against those of the present state, before it is changed."""
-    for name, value in save_state(simulation).items():
-        if name.startswith(("fixture/", "sleep/")):
-            continue  # They depend on what is under way.
+def _check_arrays(state: Mapping[str, np.ndarray]) -> None:
+    if ARRAYS not in state:
+        raise InputError(f"The saved state lacks '{ARRAYS}': it is incomplete.")
+    saved = set(map(str, np.ravel(state[ARRAYS])))
+    for line in sorted(saved ^ _checksums(state)):
+        name = line.rpartition(" ")[0]
         if name not in state:
             raise InputError(f"The saved state lacks '{name}': it is incomplete.")
-        if state[name].shape != value.shape:
-            raise InputError(
-                f"The saved state is damaged: '{name}' has shape {state[name].shape}, "
-                f"not {value.shape}."
+        raise InputError(f"The saved state is damaged: '{name}' is not what was saved.")
+
+
+def _checksums(state: Mapping[str, np.ndarray]) -> set[str]:
+    """Return what identifies each array, but for those in which the state describes itself."""
+    lines = set()
+    for name, value in state.items():
+        if not name.startswith("of/"):
+            checksum = zlib.crc32(np.ascontiguousarray(value).tobytes())
+            lines.add(
+                f"{name} {value.dtype.str}{list(value.shape)}{checksum:08x}".replace(", ", ",")
             )
-        if value.dtype.kind == "f" and not np.isfinite(state[name]).all():
-            raise InputError(f"The saved state is damaged: '{name}' is not finite.")
-    cell, nested = simulation.cell, _nested(state)
-    bodies = {part.part.name: part.body for part in cell.parts} | {"jig_base": cell.jig_base.body}
-    for name, body in bodies.items():
-        kind = "loads" if nested["asleep"][name] else "latest"
-        if full_name(body) not in nested.get("sleep", {}).get(kind, {}):
-            raise InputError(f"The saved state lacks the load of '{name}': it is incomplete.")
+    return lines
 
 
 def _flat(nested: Mapping[str, Any], prefix: str = "") -> State:
@@ -147,7 +152,8 @@ def _nested(flat: Mapping[str, np.ndarray]) -> dict[str, Any]:
 
 def write_state(path: Path, state: State) -> None:
     """Write a saved state to a compressed npz."""
-    np.savez_compressed(path, allow_pickle=False, **state)
+    with path.open("wb") as file:  # Given a path, NumPy would add an ending.
+        np.savez_compressed(file, allow_pickle=False, **state)
 
 
 def read_state(path: Path) -> State:
