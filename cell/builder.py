@@ -168,8 +168,9 @@ def add_cell(
         builder.AddNamedSystem(f"{prefix}{arm}_drive", own.arm)
         builder.AddNamedSystem(f"{prefix}{own.tool_name}_drive", own.tool)
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
-    plant.set_name(f"{name or 'cell'}_plant")
-    scene_graph.set_name(f"{name or 'cell'}_scene_graph")
+    # With no name of the cell, those that Drake's visualizers look for.
+    plant.set_name(f"{prefix}plant")
+    scene_graph.set_name(f"{prefix}scene_graph")
     workcell = add_workcell(plant, config, product.tray)
     if not config.workcell.jig_base_fixed:
         for sliding in (workcell.plate, workcell.base):

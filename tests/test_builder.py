@@ -55,7 +55,7 @@ def test_callers_diagram_steps_after_the_handles_are_dropped() -> None:
     simulator = Simulator(diagram)
     simulator.set_monitor(monitor)
     del monitor
-    plant = diagram.GetSubsystemByName("cell_plant")
+    plant = diagram.GetSubsystemByName("plant")
     before = plant.GetPositions(plant.GetMyContextFromRoot(simulator.get_context()))
     simulator.AdvanceTo(0.02)
     gc.collect()

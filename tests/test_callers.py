@@ -10,6 +10,7 @@ from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context, DiagramBuilder, EventStatus
 from pydrake.systems.primitives import ConstantVectorSource
+from pydrake.visualization import ApplyVisualizationConfig, VisualizationConfig
 
 from cell import (
     Cell,
@@ -114,12 +115,19 @@ def test_what_the_bag_cannot_hold_is_refused() -> None:
             cell.fixture.receive(root, plant.GetBodyByName(name))
 
 
-def test_callers_own_plant_beside_the_cells() -> None:
-    """Drake gives it the plain names."""
+def test_callers_own_plant_beside_a_cell_with_a_name() -> None:
     builder = DiagramBuilder()
-    cell = add_cell(builder, CellConfig(), EMPTY)
+    cell = add_cell(builder, CellConfig(), EMPTY, name="cell")
     plant, _ = AddMultibodyPlantSceneGraph(builder, 1e-3)
     plant.Finalize()
+    start(cell.with_diagram(builder.Build()))
+
+
+def test_drakes_visualizers_find_a_cell_without_a_name() -> None:
+    builder = DiagramBuilder()
+    cell = add_cell(builder, CellConfig(), EMPTY)
+    config = VisualizationConfig(publish_contacts=False, enable_meshcat_creation=False)
+    ApplyVisualizationConfig(config, builder)
     start(cell.with_diagram(builder.Build()))
 
 
