@@ -78,7 +78,7 @@ def test_continuing_is_bit_identical_in_the_same_and_in_a_new_simulation(
 def test_restored_state_saves_to_the_same_arrays(motor_unit_cell: Cell) -> None:
     state = save_state(under_way(motor_unit_cell))
     fresh = Simulation(motor_unit_cell)
-    restore_state(fresh, state)
+    restore_state(fresh, state | {"q/of the caller's own": np.zeros(3)})
     again = save_state(fresh)
     assert again.keys() == state.keys()
     for name, value in state.items():
@@ -199,11 +199,11 @@ def test_every_missing_array_is_noticed(small_cell: Cell) -> None:
             restore_state(simulation, rest)
 
 
-@pytest.mark.parametrize("name", ["q", "steps", "fixture/state", "fixture/tetrahedra", "q/deeper"])
+@pytest.mark.parametrize("name", ["q", "steps", "fixture/state", "fixture/tetrahedra"])
 def test_damaged_state_is_refused_and_changes_nothing(small_cell: Cell, name: str) -> None:
     """Also where only numbers differ, and never half way."""
     state = save_state(play_ours(small_cell, {0: press_motor}, 20))
-    value = state.get(name, np.zeros(3))
+    value = state[name]
     damages = [np.zeros(7)]
     if value.dtype.kind == "f":
         damages += [value * np.nan, value + 1e-12]

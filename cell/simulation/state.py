@@ -60,9 +60,9 @@ def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> No
             one.
     """
     _check_identity(simulation, state)
-    _check_arrays(state)
+    names = _check_arrays(state)
     try:
-        _restore(simulation, _nested(state))
+        _restore(simulation, _nested({name: state[name] for name in names}))
     except KeyError as missing:
         raise InputError(f"The saved state lacks {missing}: it is incomplete.") from missing
     except (AttributeError, IndexError, RuntimeError, TypeError, ValueError) as error:
@@ -103,15 +103,17 @@ def _check_identity(simulation: Simulation, state: Mapping[str, np.ndarray]) -> 
             raise InputError(f"The saved state is of another {what}: {then}, not {now}.")
 
 
-def _check_arrays(state: Mapping[str, np.ndarray]) -> None:
+def _check_arrays(state: Mapping[str, np.ndarray]) -> list[str]:
+    """Return the names of the arrays that were saved; a caller may have added some of their own."""
     if ARRAYS not in state:
         raise InputError(f"The saved state lacks '{ARRAYS}': it is incomplete.")
     saved = set(map(str, np.ravel(state[ARRAYS])))
-    for line in sorted(saved ^ _checksums(state)):
+    for line in sorted(saved - _checksums(state)):
         name = line.rpartition(" ")[0]
         if name not in state:
             raise InputError(f"The saved state lacks '{name}': it is incomplete.")
         raise InputError(f"The saved state is damaged: '{name}' is not what was saved.")
+    return [line.rpartition(" ")[0] for line in saved]
 
 
 def _checksums(state: Mapping[str, np.ndarray]) -> set[str]:
