@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import re
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from stories import (
     wake,
 )
 
-from cell import Cell, CellConfig, Simulation, build_cell
+from cell import Cell, CellConfig, FixtureError, Simulation, build_cell
 from cell.errors import InputError
 from cell.fixtures.soft_jig.jig import SoftJig
 from cell.simulation.events import receive_part
@@ -83,6 +84,19 @@ def test_restored_state_saves_to_the_same_arrays(motor_unit_cell: Cell) -> None:
     assert again.keys() == state.keys()
     for name, value in state.items():
         np.testing.assert_array_equal(again[name], value, err_msg=name)
+
+
+def test_bodies_in_the_bag_keep_their_order(motor_unit_cell: Cell) -> None:
+    """Their forces are added in it, and sums of rounded numbers depend on it."""
+    cell = motor_unit_cell
+    simulation, fresh = Simulation(cell), Simulation(cell)
+    for name in reversed(list(cell.parts.by_name)):
+        with contextlib.suppress(FixtureError):  # Some have nothing for the bag to hold.
+            receive_part(name)(simulation)
+    restore_state(fresh, save_state(simulation))
+    pressing = list(soft_jig(cell).memory(simulation.root).pressing)
+    assert len(pressing) > 1
+    assert list(soft_jig(cell).memory(fresh.root).pressing) == pressing
 
 
 def test_restoring_brings_back_sleep_and_drive_mode(motor_unit_cell: Cell) -> None:
