@@ -16,10 +16,12 @@ from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant, Multibody
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.configuration.config import CellConfig
+from cell.contact.links import ContactLinks
 from cell.errors import InputError, UnknownName
 from cell.fixtures import add_fixture
 from cell.fixtures.base import Fixture
 from cell.fixtures.wiring import wire_fixture
+from cell.link_policy import Policy
 from cell.machines.arm import Arm
 from cell.machines.devices import add_arms, make_drives
 from cell.machines.drive import JointDrive
@@ -51,6 +53,7 @@ class Cell:
         fixture: Holds a part on the base.
         parts: The loose parts.
         threads: Of the product's bolts.
+        links: Contacts that stick, as springs.
         sleeper: Puts parts and base to sleep.
         force_plate: Wrench sensor under the jig.
         ports: Inputs and outputs by name.
@@ -67,6 +70,7 @@ class Cell:
     fixture: Fixture
     parts: Parts
     threads: Threads
+    links: ContactLinks
     sleeper: Sleep
     force_plate: WrenchSensor
     ports: Ports
@@ -185,10 +189,15 @@ def add_cell(
         fixture.add_part(plant, part.body, part.part.mesh)
     if extend is not None:
         extend(plant, scene_graph)
+    grippers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Gripper)]
+    policy = Policy.of(grippers, fixture, parts, threads)
+    most = most_links(config, len(parts.by_name))
+    spare = (next((part.body for part in parts), workcell.base), workcell.base)
+    links = ContactLinks(plant, scene_graph, policy, most, spare)
     plant.Finalize()
 
     bearers = (workcell.base, workcell.plate)
-    wiring = wire_fixture(builder, plant, scene_graph, fixture, bearers, prefix)
+    wiring = wire_fixture(builder, plant, scene_graph, fixture, bearers, links, prefix)
     builder.AddNamedSystem(f"{prefix}threads", threads)
     force_plate = WrenchSensor(plant, workcell.plate_weld)
     ports = Ports()
@@ -206,6 +215,7 @@ def add_cell(
 
     def reset(root: Context) -> None:
         threads.install(root)
+        links.install(root)
         jig_base.reset(root)
         fixture.install(root)
 
@@ -219,10 +229,11 @@ def add_cell(
         fixture=fixture,
         parts=replace(parts, sleeper=wiring.sleeper),
         threads=threads,
+        links=links,
         sleeper=wiring.sleeper,
         force_plate=force_plate,
         ports=ports,
-        monitor=Monitor(counter, reset, (fixture, threads)),
+        monitor=Monitor(counter, reset, (fixture, threads, links)),
     )
 
 
@@ -240,6 +251,14 @@ def _check_names(builder: DiagramBuilder, *planned: str) -> None:
             'of its own, add_cell(..., name="left_cell"), which becomes their prefix'
             f"{'.' if planned else ', in a new builder.'}"
         )
+
+
+def most_links(config: CellConfig, parts: int) -> int:
+    """Return how many contacts may be linked at a time in a cell with some parts.
+
+    Each part has a seat or a head; a held one has two jaws more, a fixed one the fixture.
+    """
+    return parts + 4 if parts and config.simulation.contact == "linked" else 0
 
 
 def plant_config(config: CellConfig) -> MultibodyPlantConfig:

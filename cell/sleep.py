@@ -18,12 +18,13 @@ from typing import Any
 
 from pydrake.common.value import AbstractValue, Value
 from pydrake.geometry import CollisionFilterDeclaration, GeometrySet, SceneGraph
-from pydrake.multibody.math import SpatialVelocity
+from pydrake.multibody.math import SpatialForce, SpatialVelocity
 from pydrake.multibody.plant import ExternallyAppliedSpatialForce, MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context, LeafSystem
 
 from cell.bodies import body_of, full_name
+from cell.contact.links import ContactLinks
 from cell.forces import applied_force, forces_from_rows, forces_to_rows, no_forces
 
 Forces = list[ExternallyAppliedSpatialForce]
@@ -54,14 +55,19 @@ class Sleep(LeafSystem):
         plant: The finalized plant.
         scene_graph: Its scene graph.
         bearers: Bodies whose load a sensor feels: the jig's base, the force plate.
+        links: Contacts of the plant that springs stand for at times; None: there are none.
     """
 
     def __init__(
-        self, plant: MultibodyPlant, scene_graph: SceneGraph, bearers: Sequence[RigidBody]
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        bearers: Sequence[RigidBody],
+        links: ContactLinks | None = None,
     ) -> None:
         super().__init__()
         self._plant, self._scene_graph = plant, scene_graph
-        self._bearers = tuple(bearers)
+        self._bearers, self._links = tuple(bearers), links
         joints = map(plant.get_joint, plant.GetJointIndices())
         self._joints = {int(joint.child_body().index()): joint for joint in joints}
         self._index = self.DeclareAbstractParameter(Value[object](SleepMemory()))
@@ -98,6 +104,8 @@ class Sleep(LeafSystem):
             self._plant.SetFreeBodySpatialVelocity(context, body, SpatialVelocity.Zero())
             self._joints[int(body.index())].Lock(context)
             self._set_contact(root, body, apart_from, active=False)
+            if self._links is not None:
+                self._links.pause(root, body)
 
     def wake(self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody] = ()) -> None:
         """Let a body move again, from rest; arguments as of `put_to_sleep`."""
@@ -106,6 +114,8 @@ class Sleep(LeafSystem):
             self._changed(root).loads.pop(full_name(body), None)
             self._set_contact(root, body, apart_from, active=True)
             self._joints[int(body.index())].Unlock(context)
+            if self._links is not None:
+                self._links.resume(root, body)
 
     def _set_contact(
         self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody], *, active: bool
@@ -148,6 +158,12 @@ class Sleep(LeafSystem):
                 F_W = -info.F_Ac_W() if M in own else info.F_Ac_W()
                 X_BW = self._plant.EvalBodyPoseInWorld(context, bearer).inverse()
                 yield applied_force(bearer.index(), X_BW @ surface.centroid(), F_W)
+        bearer_indices = {bearer.index() for bearer in bearers}
+        for other, wrench in () if self._links is None else self._links.wrenches(root, body):
+            if other.index() in bearer_indices:
+                X_BW = self._plant.EvalBodyPoseInWorld(context, other).inverse()
+                F_W = SpatialForce(wrench[:3], wrench[3:])
+                yield applied_force(other.index(), X_BW.translation(), F_W)
 
     # Saving.
 

@@ -223,6 +223,7 @@ def snapshot(cell: Cell, root: Context) -> Snapshot:
         "asleep": {part.part.name: part.asleep(root) for part in cell.parts},
         "threads": cell.threads.save(root),
         "fixture": cell.fixture.save(root),
+        "links": cell.links.save(root),
         "loads": cell.sleeper.save(root, [part.body for part in cell.parts]),
         "force_plate": cell.force_plate.read(context),
         "wrists": {name: arm.wrist.read(context) for name, arm in cell.arms.items()},

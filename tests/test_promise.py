@@ -40,9 +40,9 @@ ARM_STORY: Story = {0: relax_arm, 60: stiffen_arm, 80: relax_arm}
 BOLT_STORY: Story = {0: move_arm, 20: catch_bolt}
 
 
-@pytest.fixture(scope="module")
-def cell() -> Cell:
-    return build_cell(QUICK, PRODUCT)
+@pytest.fixture(scope="module", params=["full", "linked"])
+def cell(request: pytest.FixtureRequest) -> Cell:
+    return build_cell(QUICK.with_changes({"simulation.contact": request.param}), PRODUCT)
 
 
 @pytest.fixture(scope="module")
@@ -101,7 +101,7 @@ def test_the_story_is_one(cell: Cell) -> None:
 def test_two_cells_in_one_diagram_do_not_meet(cell: Cell, pressed: Snapshot) -> None:
     """Each does what it does alone, the jig of one and the arms of the other."""
     builder = DiagramBuilder()
-    cells = [add_cell(builder, QUICK, PRODUCT, name=name) for name in ("one", "other")]
+    cells = [add_cell(builder, cell.config, PRODUCT, name=name) for name in ("one", "other")]
     diagram = builder.Build()
     one, other = (each.with_diagram(diagram) for each in cells)
     simulator = Simulator(diagram)

@@ -117,9 +117,10 @@ def test_restoring_brings_back_sleep_and_drive_mode(motor_unit_cell: Cell) -> No
 ASLEEP_STORY: Story = {0: press_motor, 200: let_go, 250: sleep, 300: fix, 500: wake}
 
 
-@pytest.fixture(scope="module")
-def small_cell() -> Cell:
-    return build_cell(QUICK, small_product("motor"))
+@pytest.fixture(scope="module", params=["full", "linked"])
+def small_cell(request: pytest.FixtureRequest) -> Cell:
+    config = QUICK.with_changes({"simulation.contact": request.param})
+    return build_cell(config, small_product("motor"))
 
 
 def go_on(cell: Cell, simulation: Simulation, story: Story, steps: int) -> None:

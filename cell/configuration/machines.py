@@ -25,6 +25,11 @@ class SimulationConfig:
         "[M] Thresholds of holding differ between them.",
         choices=("lagged", "similar", "sap"),
     )  # fmt: skip
+    contact: str = setting(
+        "full", "", "Whether contacts that stick become springs (linked) or stay areas (full).",
+        "[M] Linked takes half the time; compared for three assemblies only.",
+        choices=("full", "linked"),
+    )  # fmt: skip
     log_period: float = setting(
         0.01, "s", "Time between two samples of the log.",
         "[A] Own choice.",

@@ -80,6 +80,10 @@ class JointDrive(LeafSystem):
             raise InputError(f"'{self.get_name()}' takes {self.size} efforts, not {len(effort)}.")
         self.GetMyMutableContextFromRoot(root).SetDiscreteState(self._effort, effort)
 
+    def target(self, root: Context) -> np.ndarray:
+        """Return the desired positions (n,) of the joints, whoever commands them."""
+        return self.desired(self.GetMyContextFromRoot(root))[: self.size]
+
     def desired(self, context: Context) -> np.ndarray:
         """Return the desired state (2n,) in the drive's own Context."""
         return context.get_discrete_state(self._target).value()

@@ -174,6 +174,8 @@ class Phase:
         start: Events at the start of the phase.
         every_step: Event after every step.
         awake: Names of the parts that are awake during the phase.
+        mating: Names of the two parts of each pair that is being mated: their contact is computed
+            in full.
         fine_log: Log every step.
         tare: Whether the wrists read zero at the start; not in a phase that begins under load.
     """
@@ -187,6 +189,7 @@ class Phase:
     start: tuple[Event, ...] = ()
     every_step: Event | None = None
     awake: frozenset[str] = frozenset()
+    mating: frozenset[frozenset[str]] = frozenset()
     fine_log: bool = False
     tare: bool = True
 

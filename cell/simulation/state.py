@@ -44,6 +44,7 @@ def save_state(simulation: Simulation) -> State:
         "sleep": cell.sleeper.save(root, [*bodies, *free, cell.jig_base.body]),
         "threads": cell.threads.save(root),
         "fixture": cell.fixture.save(root),
+        "links": cell.links.save(root),
     }
     flat = _flat(state)
     return flat | {ARRAYS: np.array(sorted(_checksums(flat)))}
@@ -69,6 +70,7 @@ def restore_state(simulation: Simulation, state: Mapping[str, np.ndarray]) -> No
 
 def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     cell, root, context = simulation.cell, simulation.root, simulation.context
+    cell.links.clear(root)
     # Sleep is restored in the end; what was asleep before must not keep its locks and filters.
     cell.parts.sleep_all_but(root, cell.parts.by_name)
     cell.jig_base.wake(root)
@@ -90,6 +92,7 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     cell.sleeper.restore(root, state["sleep"], root.get_time())
     cell.plant.SetPositions(context, state["q"])
     cell.plant.SetVelocities(context, state["v"])
+    cell.links.restore(root, state["links"])
     simulation.simulator.Initialize()
 
 

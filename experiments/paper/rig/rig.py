@@ -23,11 +23,13 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cell.builder import plant_config
+from cell.builder import most_links, plant_config
 from cell.configuration.config import CellConfig
+from cell.contact.links import ContactLinks
 from cell.fixtures import add_fixture
 from cell.fixtures.soft_jig import SurfaceSamples
 from cell.fixtures.wiring import wire_fixture
+from cell.link_policy import Policy
 from cell.machines.drive import JointDrive
 from cell.machines.gripper import Gripper, GripperDrive
 from cell.machines.grippers import HAND_E
@@ -158,9 +160,11 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     fixture.add_part(plant, loose.body, loose.part.mesh)
     wrist, hand = _add_carriage(plant)
     gripper = Gripper.add(plant, hand, "gripper", HAND_E, jaws)
+    policy, spare = Policy.of([gripper], fixture, [loose]), (loose.body, workcell.base)
+    links = ContactLinks(plant, scene_graph, policy, most_links(config, 1), spare)
     plant.Finalize()
     bearers = (workcell.base, workcell.plate)
-    sleeper = wire_fixture(builder, plant, scene_graph, fixture, bearers).sleeper
+    sleeper = wire_fixture(builder, plant, scene_graph, fixture, bearers, links).sleeper
     jig_base = JigBase(config, plant, workcell.base, workcell.plate, sleeper)
     carriage = plant.GetModelInstanceByName("carriage")
     drive.connect(builder, plant, carriage)
@@ -168,6 +172,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     X_MountT = plant.GetFrameByName("tip", hand).GetFixedPoseInBodyFrame()
 
     def reset(root: Context) -> None:
+        links.install(root)
         jig_base.reset(root)
         fixture.install(root)
 
@@ -187,7 +192,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
         wrist=WrenchSensor(plant, wrist),
         force_plate=WrenchSensor(plant, workcell.plate_weld),
         sleeper=sleeper,
-        monitor=Monitor(counter, reset, [fixture]),
+        monitor=Monitor(counter, reset, (fixture, links)),
     )
 
 

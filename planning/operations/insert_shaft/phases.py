@@ -178,6 +178,7 @@ def _insert(
             commands={arm: impedance(config, jaw, X_JawC, target, force)},
             guard=guard,
             awake=awake,
+            mating=frozenset([frozenset([fit.hole, fit.shaft])]),
             fine_log=True,
             tare=kind is InsertPhase.INSERT,
         )

@@ -151,6 +151,8 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     config, root = station.config, station.root
     tip, screw = driver.frame("tool_tip"), station.cell.product.screws[bolt]
     threads, awake = station.cell.threads, _awake(station, bolt)
+    # What the bolt clamps together slips into place meanwhile.
+    mating = frozenset([frozenset([screw.into, screw.clamps])])
 
     yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
     holding = [(station.hand, part) for part in station.fixed]
@@ -206,6 +208,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         subject=bolt,
         commands={driver.name: feed, spindle: Spin(config.driver.free_speed)},
         awake=awake,
+        mating=mating,
     )
     station.driven += (bolt,)
     yield Phase(
@@ -215,6 +218,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         subject=bolt,
         commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
         awake=awake,
+        mating=mating,
         fine_log=True,
     )
     yield Phase(
@@ -224,6 +228,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         subject=bolt,
         commands={spindle: Spin(0.0)},
         awake=awake,
+        mating=mating,
     )
     off = backed_off(station.tool_pose(driver, "tool_tip"), BIT_HOVER + FEED_DEPTH)
     yield Phase(

@@ -1,0 +1,342 @@
+"""Links in a cell: contacts that stick are replaced by springs, and come back when they must.
+
+Area contact forms and ends every grip, seat and imprint. In between, while two bodies stick to each
+other, their polygons only say again and again what six springs say as well, at a tenth of the cost.
+Links are checked every few steps; a contact that would open, slide or yield, or has moved too far,
+is given back to Drake.
+
+`simulation.contact: full` leaves all of it out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.common.value import Value
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import HydroelasticContactInfo, MultibodyPlant
+from pydrake.multibody.tree import RigidBody
+from pydrake.systems.framework import Context, LeafSystem
+
+from cell.contact.link import Link
+from cell.contact.plant_side import SPRINGS, Pair, PlantSide
+
+Array = NDArray[np.float64]
+Mating = frozenset[frozenset[str]]  # Names of the two parts of each pair.
+
+LOOK_PERIOD = 0.01  # For contacts that have come to a stand [s] [A].
+CHECK_PERIOD = 0.005  # Of the links [s] [A].
+# A contact stands when it has moved by less than STILL for WAIT [m, s]: 0.5 mm/s, a tenth of the
+# slowest motion of an arm [A]. After a return it has to wait longer, up to PATIENCE times.
+STILL, WAIT, PATIENCE = 1e-5, 0.02, 5
+LEVER = 0.02  # At which a rotation counts as motion [m] [A].
+FEWEST = 4  # Polygons of a contact that resists every displacement.
+
+
+class Sticking(Protocol):
+    """What says which contacts may be linked: `cell.link_policy`."""
+
+    def until(self, root: Context, A: RigidBody, B: RigidBody, mating: Mating) -> object | None:
+        """Return what a link between two bodies lasts until the change of; None: no link."""
+        ...
+
+    def limits(self, root: Context, A: RigidBody, B: RigidBody, normals_W: Array) -> Array:
+        """Return the pressure (n,) that their surfaces bear, given normals (n, 3) [Pa]."""
+        ...
+
+
+@dataclass(frozen=True)
+class Installed:
+    """A link in the plant.
+
+    Attributes:
+        link: Which one.
+        slots: (6,) numbers of the springs that it uses.
+        hidden: (k, 2) numbers of the geometries of A and B that it has taken out of contact.
+        until: It ends when the policy says something else than this.
+    """
+
+    link: Link
+    slots: tuple[int, ...]
+    hidden: Array
+    until: object
+
+
+@dataclass
+class LinksMemory:
+    """What is remembered of links in a Context.
+
+    Attributes:
+        installed: By pair of bodies.
+        watched: Contacts that may be linked: relative pose (3, 4) and step since when it holds.
+        returns: How often each pair has got its full contact back by a check.
+        mating: Pairs of parts whose contact stays full.
+        steps: Since the beginning.
+        linked: Sum over the steps of the numbers of links.
+        made: Links made so far.
+        ended: By reason, links that ended.
+    """
+
+    installed: dict[Pair, Installed] = field(default_factory=dict)
+    watched: dict[Pair, tuple[Array, int]] = field(default_factory=dict)
+    returns: dict[Pair, int] = field(default_factory=dict)
+    mating: Mating = frozenset()
+    steps: int = 0
+    linked: int = 0
+    made: int = 0
+    ended: Counter[str] = field(default_factory=Counter)
+
+    def __deepcopy__(self, memo: dict[int, Any]) -> LinksMemory:
+        """Copy what is changed in place."""
+        installed = {p: replace(own, link=replace(own.link)) for p, own in self.installed.items()}
+        return replace(
+            self,
+            installed=installed,
+            watched=dict(self.watched),
+            returns=dict(self.returns),
+            ended=Counter(self.ended),
+        )
+
+
+class ContactLinks(LeafSystem):
+    """Replaces contacts that stick by springs, in the Context of a diagram.
+
+    Args:
+        plant: Not finalized yet.
+        scene_graph: The plant's.
+        policy: Which contacts may be linked.
+        most: Links at a time; 0: contact is always full.
+        spare: A free body and another one, neither the world: see `PlantSide`.
+
+    Attributes:
+        policy: As given.
+    """
+
+    def __init__(
+        self,
+        plant: MultibodyPlant,
+        scene_graph: SceneGraph,
+        policy: Sticking,
+        most: int,
+        spare: tuple[RigidBody, RigidBody],
+    ) -> None:
+        super().__init__()
+        self._plant, self.policy, self._most = plant, policy, most
+        self._side = PlantSide(plant, scene_graph, most, spare)
+        self._index = self.DeclareAbstractParameter(Value[object](LinksMemory()))
+
+    def memory(self, root: Context) -> LinksMemory:
+        """Return what is remembered in a Context of the diagram; not to be changed."""
+        return self.GetMyContextFromRoot(root).get_abstract_parameter(self._index).get_value()
+
+    def _changed(self, root: Context) -> LinksMemory:
+        context = self.GetMyMutableContextFromRoot(root)
+        return context.get_mutable_abstract_parameter(self._index).get_mutable_value()
+
+    # Commands; each takes the Context of the whole diagram.
+
+    def install(self, root: Context) -> None:
+        """Bring a new Context into its initial state: no link."""
+        self._side.switch_all_off(root)
+
+    def keep_full(self, root: Context, mating: Mating) -> None:
+        """Keep the contacts between parts that are being mated full, until the next call.
+
+        Args:
+            root: Of the diagram.
+            mating: Names of the two parts of each pair.
+        """
+        if mating != self.memory(root).mating:
+            self._changed(root).mating = mating
+            self._end_unwanted(root)
+
+    def release(self, root: Context, body: RigidBody) -> None:
+        """Give all contacts of a body back, before its geometry changes."""
+        for pair in self._of(root, body):
+            self._end(root, pair, "geometry")
+
+    def pause(self, root: Context, body: RigidBody) -> None:
+        """Switch the springs of a body off while it sleeps."""
+        for pair in self._of(root, body):
+            self._side.switch(root, self.memory(root).installed[pair].slots, on=False)
+
+    def resume(self, root: Context, body: RigidBody) -> None:
+        """Switch them on again, where the contact still sticks."""
+        context = self._plant.GetMyContextFromRoot(root)
+        for pair in self._of(root, body):
+            if not self._side.asleep(context, pair) and not self._ended_by_check(root, pair):
+                self._side.switch(root, self.memory(root).installed[pair].slots, on=True)
+
+    # Readings.
+
+    def wrenches(self, root: Context, body: RigidBody) -> Iterator[tuple[RigidBody, Array]]:
+        """Yield every body that a body is linked to, and the wrench (6,) on that, about Wo."""
+        context = self._plant.GetMyContextFromRoot(root)
+        for pair in self._of(root, body):
+            A, B = self._side.bodies(pair)
+            link = self.memory(root).installed[pair].link
+            on_A = link.wrench(*self._side.poses(context, pair))
+            yield (B, -on_A) if A.index() == body.index() else (A, on_A)
+
+    def summary(self, root: Context) -> dict[str, Any]:
+        """Return mean number of links, how many were made, and how many ended, by reason."""
+        memory = self.memory(root)
+        mean = memory.linked / max(memory.steps, 1)
+        return {"mean": mean, "made": memory.made, "ended": dict(sorted(memory.ended.items()))}
+
+    # Simulation.
+
+    def step(self, root: Context, dt: float) -> None:
+        """Check the links, and look for contacts that stick, after a step of the plant."""
+        if self._most == 0:
+            return
+        memory = self._changed(root)
+        memory.steps += 1
+        memory.linked += len(memory.installed)
+        self._end_unwanted(root)
+        if memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0:
+            self._check(root)
+        if memory.steps % max(1, round(LOOK_PERIOD / dt)) == 0:
+            self._look(root, dt)
+
+    def _end_unwanted(self, root: Context) -> None:
+        memory = self.memory(root)
+        for pair, own in list(memory.installed.items()):
+            if self.policy.until(root, *self._side.bodies(pair), memory.mating) != own.until:
+                self._end(root, pair, "command")
+
+    def _check(self, root: Context) -> None:
+        context, memory = self._plant.GetMyContextFromRoot(root), self.memory(root)
+        for pair in list(memory.installed):
+            if not self._side.asleep(context, pair) and not self._ended_by_check(root, pair):
+                own = memory.installed[pair]
+                if own.link.relax(*self._side.poses(context, pair)):
+                    self._side.set_springs(root, pair, own.slots, own.link)
+
+    def _ended_by_check(self, root: Context, pair: Pair) -> bool:
+        """Give a contact back if it does not stick any more; return whether it does not."""
+        memory, context = self._changed(root), self._plant.GetMyContextFromRoot(root)
+        reason = memory.installed[pair].link.violation(*self._side.poses(context, pair))
+        if reason is not None:
+            self._end(root, pair, reason)
+            memory.returns[pair] = memory.returns.get(pair, 0) + 1
+        return reason is not None
+
+    def _look(self, root: Context, dt: float) -> None:
+        """Link what has been standing still."""
+        memory, context = self._changed(root), self._plant.GetMyContextFromRoot(root)
+        seen: dict[Pair, tuple[Array, int]] = {}
+        for pair, contacts in self._side.contacts(context).items():
+            until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
+            # Drake 1.58 crashes with the world as a body of a distance constraint.
+            if until is None or pair in memory.installed or 0 in pair:
+                continue
+            X_WA, X_WB = self._side.poses(context, pair)
+            now = X_WB.InvertAndCompose(X_WA).GetAsMatrix34()
+            then, since = memory.watched.get(pair, (now, memory.steps))
+            if _way(then, now) > STILL:
+                then, since = now, memory.steps
+            patience = WAIT * min(1 + memory.returns.get(pair, 0), PATIENCE)
+            if (memory.steps - since) * dt >= patience - dt / 2:
+                if self._link(root, pair, contacts, until, dt):
+                    continue
+                since = memory.steps
+            seen[pair] = (then, since)
+        memory.watched = seen
+
+    def _link(
+        self,
+        root: Context,
+        pair: Pair,
+        contacts: list[HydroelasticContactInfo],
+        until: object,
+        dt: float,
+    ) -> bool:
+        """Replace a contact by springs, if it sticks; return whether it does."""
+        memory, context = self._changed(root), self._plant.GetMyContextFromRoot(root)
+        polygons, wrench = self._side.read(pair, contacts)
+        used = (slot for own in memory.installed.values() for slot in own.slots)
+        slots = self._side.free_slots(used)
+        if len(polygons) < FEWEST or len(slots) < SPRINGS:
+            return False
+        limits = self.policy.limits(root, *self._side.bodies(pair), polygons.normals)
+        try:
+            link = Link.of(polygons, wrench, limits, *self._side.poses(context, pair))
+        except np.linalg.LinAlgError:
+            return False
+        if not link.admissible():
+            return False
+        link.softening = self._side.resolvable(context, pair, link.springs, dt)
+        own = Installed(link, slots, self._side.touching(root, pair), until)
+        self._install(root, pair, own)
+        memory.made += 1
+        return True
+
+    def _install(self, root: Context, pair: Pair, own: Installed) -> None:
+        self._changed(root).installed[pair] = own
+        self._side.set_springs(root, pair, own.slots, own.link)
+        asleep = self._side.asleep(self._plant.GetMyContextFromRoot(root), pair)
+        self._side.switch(root, own.slots, on=not asleep)
+        self._side.hide(root, pair, own.hidden, hidden=True)
+
+    def _end(self, root: Context, pair: Pair, reason: str) -> None:
+        memory = self._changed(root)
+        own = memory.installed.pop(pair)
+        memory.ended[reason] += 1
+        self._side.switch(root, own.slots, on=False)
+        self._side.hide(root, pair, own.hidden, hidden=False)
+
+    def _of(self, root: Context, body: RigidBody) -> list[Pair]:
+        return [pair for pair in self.memory(root).installed if int(body.index()) in pair]
+
+    # Saving.
+
+    def save(self, root: Context) -> dict[str, Any]:
+        """Return everything that changes as nested dictionaries of arrays."""
+        memory, name = self.memory(root), self._side.name
+        return {
+            "links": {
+                name(pair): own.link.arrays() | {"slots": np.array(own.slots), "hidden": own.hidden}
+                for pair, own in memory.installed.items()
+            },
+            "watched": {
+                name(pair): {"pose": pose, "since": np.array(since)}
+                for pair, (pose, since) in memory.watched.items()
+            },
+            "returns": {name(pair): np.array(count) for pair, count in memory.returns.items()},
+            "mating": np.array(sorted("|".join(sorted(pair)) for pair in memory.mating), dtype=str),
+            "counts": np.array([memory.steps, memory.linked, memory.made]),
+            "ended": {reason: np.array(count) for reason, count in memory.ended.items()},
+        }
+
+    def clear(self, root: Context) -> None:
+        """End all links, so that what is in contact can be restored."""
+        for pair in list(self.memory(root).installed):
+            self._end(root, pair, "restore")
+
+    def restore(self, root: Context, state: Mapping[str, Any]) -> None:
+        """Return to a saved state; all links have been cleared, and all else is restored."""
+        memory, pair_of = self._changed(root), self._side.pair
+        watched, returns = state.get("watched", {}), state.get("returns", {})
+        memory.watched = {pair_of(n): (w["pose"], int(w["since"])) for n, w in watched.items()}
+        memory.returns = {pair_of(name): int(count) for name, count in returns.items()}
+        memory.mating = frozenset(frozenset(str(pair).split("|")) for pair in state["mating"])
+        memory.steps, memory.linked, memory.made = map(int, state["counts"])
+        memory.ended = Counter({n: int(count) for n, count in state.get("ended", {}).items()})
+        for name, arrays in state.get("links", {}).items():
+            pair = pair_of(name)
+            until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
+            slots, hidden = tuple(map(int, arrays["slots"])), arrays["hidden"]
+            self._install(root, pair, Installed(Link.from_arrays(arrays), slots, hidden, until))
+
+
+def _way(then: Array, now: Array) -> float:
+    """Return by how much a pose (3, 4) has changed [m]."""
+    change = now - then
+    turned = 0.5 * np.sum((LEVER * change[:, :3]) ** 2)
+    return float(np.sqrt(np.sum(change[:, 3] ** 2) + turned))
