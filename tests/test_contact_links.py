@@ -236,6 +236,21 @@ def test_a_sleeping_body_keeps_its_link_without_springs() -> None:
     assert block.linked
 
 
+def test_a_body_on_a_stand_is_not_linked() -> None:
+    """Whoever locks its joint unlocks it without notice: nothing would hold it then."""
+    block = Block(linked=True)
+    block.links.clear(block.root)
+    joint = block.plant.GetJointByName("block")
+    joint.Lock(block.context)
+    for _ in range(100):
+        block.step(np.zeros(3))
+    assert not block.linked
+    joint.Unlock(block.context)
+    for _ in range(100):
+        block.step(np.zeros(3))
+    assert block.linked
+
+
 def test_wrench_of_a_link_is_the_load() -> None:
     block = Block(linked=True)
     ((other, wrench),) = block.links.wrenches(block.root, block.body)

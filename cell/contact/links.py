@@ -233,8 +233,11 @@ class ContactLinks(LeafSystem):
         seen: dict[Pair, tuple[Array, int]] = {}
         for pair, contacts in self._side.contacts(context).items():
             until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
-            # Drake 1.58 crashes with the world as a body of a distance constraint.
+            # Drake 1.58 crashes with the world as a body of a distance constraint. A body that is
+            # locked and yet touches, as on a stand, is let go without notice.
             if until is None or pair in memory.installed or 0 in pair:
+                continue
+            if self._side.asleep(context, pair):
                 continue
             X_WA, X_WB = self._side.poses(context, pair)
             now = X_WB.InvertAndCompose(X_WA).GetAsMatrix34()
