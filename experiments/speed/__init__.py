@@ -1,0 +1,1 @@
+"""What simulated time costs: classes of phases, the calibration kernel, start states, layers."""
