@@ -51,7 +51,8 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "jig": set(),
         "plan": {"reporting"},
         "assembly": {"reporting"},
-        "paper": {"reporting"},
+        "speed": {"reporting"},
+        "paper": {"reporting", "speed"},
         "cli": {"reporting", "plan", "assembly", "paper"},
     },
 }  # fmt: skip

@@ -3,13 +3,17 @@
 Each metric has a tolerance with a reason. The compared value is the mean over the trials of a case.
 On one machine with one seed every run is bit-identical; the tolerances are for another machine or
 library, and for changes of the model that should not change results.
+
+The CPU time that stepping takes is compared as well, by class of what goes on, as ratios to the
+calibration kernel (`experiments.speed`), which is timed before and after each trial. A class that
+became slower is a warning: it does not change the verdict.
 """
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from importlib.metadata import version
 from pathlib import Path
 from typing import Any
@@ -25,6 +29,8 @@ from experiments.paper.cases import Case, CaseResult, run_cases
 from experiments.paper.place_push import cases_of
 from experiments.reporting.output import write_json
 from experiments.reporting.provenance import finite, versions
+from experiments.speed.calibration import Kernel
+from experiments.speed.meter import Meter, changes, ratios, slower
 
 BASELINE = MODELS / "regression"
 SEED = 0
@@ -119,6 +125,22 @@ class Drift:
 
 
 Metrics = dict[str, dict[str, float]]  # Case -> metric -> value.
+Ratios = dict[str, float]  # Class -> kernel iterations per simulated second.
+
+
+@dataclass(frozen=True)
+class Baseline:
+    """What is stored of a suite.
+
+    Attributes:
+        cases: Metrics.
+        drake: The version of Drake with which they were made.
+        speed: Ratios of CPU time; empty: not stored yet.
+    """
+
+    cases: Metrics
+    drake: str
+    speed: Ratios = field(default_factory=dict)
 
 
 def metrics_of(results: Mapping[str, CaseResult]) -> Metrics:
@@ -143,9 +165,14 @@ def drifts(stored: Metrics, now: Metrics) -> list[Drift]:
     return rows
 
 
-def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, CaseResult]:
-    """Run every case of a suite; return the results by "experiment case"."""
+def run_suite(
+    suite: Suite, config: CellConfig, console: Console
+) -> tuple[dict[str, CaseResult], Ratios]:
+    """Run every case of a suite; return the results by "experiment case", and the ratios."""
     results: dict[str, CaseResult] = {}
+    kernel = Kernel()
+    spent: list[tuple[Meter, float]] = []
+    before = kernel.time()
     for command, label in suite.cases:
         cases: list[Case] = cases_of(command, label)
         done = run_cases(
@@ -159,18 +186,21 @@ def run_suite(suite: Suite, config: CellConfig, console: Console) -> dict[str, C
             results[f"{command} {result.case.label}"] = result
             cpu = trial.trial.cpu_seconds
             console.print(f"{command} {result.case.label}: {cpu:.1f} s of CPU", markup=False)
-    return results
+            after = kernel.time()
+            spent.append((trial.trial.meter, (before + after) / 2))
+            before = after
+    return results, ratios(spent)
 
 
-def read_baseline(path: Path) -> tuple[Metrics, str]:
-    """Return the stored metrics, and the version of Drake with which they were made.
+def read_baseline(path: Path) -> Baseline:
+    """Return what is stored of a suite.
 
     Raises:
         InputError: The file is missing or cannot be read.
     """
     try:
         stored = json.loads(path.read_text(encoding="utf-8"))
-        return stored["cases"], str(stored["drake"])
+        return Baseline(stored["cases"], str(stored["drake"]), stored.get("speed", {}))
     except FileNotFoundError:
         raise InputError(f"No stored metrics '{path}': make them with --update.") from None
     except (OSError, ValueError, KeyError) as error:
@@ -186,20 +216,48 @@ def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, qu
     console = Console(quiet=quiet, highlight=False)
     suite, path = SUITES[suite_name], BASELINE / f"{suite_name}.json"
     drake = version("drake")
-    stored, of_drake = ({}, drake) if update and not path.exists() else read_baseline(path)
-    if of_drake != drake:
-        text = f"The stored metrics hold for Drake {of_drake}; this is {drake}."
+    stored = Baseline({}, drake) if update and not path.exists() else read_baseline(path)
+    if stored.drake != drake:
+        text = f"The stored metrics hold for Drake {stored.drake}; this is {drake}."
         console.print(text, markup=False, soft_wrap=True)
-    now = metrics_of(run_suite(suite, config, console))
-    rows = drifts(stored, now)
+    results, speed = run_suite(suite, config, console)
+    now = metrics_of(results)
+    rows = drifts(stored.cases, now)
     shown = [row for row in rows if row.stored != row.now] if update else rows
     console.print(drift_table(shown, *(("Changes", "changed") if update else ("Drift", "drift"))))
+    console.print(speed_table(stored.speed, speed))
+    warnings = [] if update else speed_warnings(stored.speed, speed)
+    for warning in warnings:
+        console.print(warning, markup=False, soft_wrap=True)
     good = all(row.ok for row in rows)
     if update:
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_json(path, {"suite": suite_name, "seed": SEED, "drake": drake, "cases": now})
-    write_json(out / "result.json", _result(suite_name, update or good, rows, config))
+        about = {"suite": suite_name, "seed": SEED, "drake": drake, "speed": speed}
+        write_json(path, about | {"cases": now})
+    result = _result(suite_name, update or good, rows, config)
+    result["speed"] = {"stored": stored.speed, "now": speed, "warnings": warnings}
+    write_json(out / "result.json", result)
     return 0 if update or good else 1
+
+
+def speed_warnings(stored: Ratios, now: Ratios) -> list[str]:
+    """Return a line for each class of what goes on that became slower than is stored."""
+    return [
+        f"Warning: '{name}' takes {now[name] / stored[name] - 1:.0%} more CPU time than is stored."
+        for name in slower(stored, now)
+    ]
+
+
+def speed_table(stored: Ratios, now: Ratios) -> Table:
+    """Return one line per class of what goes on, in kernel iterations per simulated second."""
+    table = Table(title="CPU time, in units of the calibration kernel", title_justify="left")
+    for heading in ("class", "stored", "now", "change"):
+        table.add_column(heading, justify="left" if heading == "class" else "right")
+    change = changes(stored, now)
+    for name, ratio in now.items():
+        known = (f"{stored[name]:.1f}", f"{change[name]:+.0%}") if name in change else ("-", "-")
+        table.add_row(name, known[0], f"{ratio:.1f}", known[1])
+    return table
 
 
 def _result(suite: str, success: bool, rows: Sequence[Drift], config: CellConfig) -> dict[str, Any]:

@@ -15,6 +15,7 @@ from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation
 from experiments.paper.rig.stage import Observer
 from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
+from experiments.speed.meter import Meter
 from planning.operations.grasping import CLEAR, CLEARANCE, GRIP_TIME, RELEASE_TIME, tip_opening
 from planning.operations.pick_place.phases import DEEPEST, JAM_TIME, PRESS_SPEED
 from planning.operations.push.phases import ABOVE, BEHIND, BEHIND_ABOVE, PushLine
@@ -81,6 +82,11 @@ class RigHand:
     def observer(self) -> Observer:
         """Observer of part and jig."""
         return self.simulation.observer
+
+    @property
+    def meter(self) -> Meter:
+        """CPU time spent stepping, by class of what goes on."""
+        return self.simulation.meter
 
     def press(self) -> None:
         """Grip the part, press it in and freeze the bag.

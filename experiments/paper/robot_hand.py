@@ -27,6 +27,8 @@ from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer, Stage
 from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
+from experiments.speed.meter import Meter
+from experiments.speed.phase_class import class_of
 from planning.operations.grasping import HandPhase
 from planning.operations.pick_place.phases import PlacePhase, pick_place
 from planning.operations.placement import anywhere
@@ -152,12 +154,13 @@ class RobotHand:
         station: The planner's view of it.
         observer: Looks at part and jig, and records from the press on.
         planned: X_JP as aimed at, with the yaw that the planner chose.
+        meter: CPU time spent stepping, by class of phase.
     """
 
     def __init__(
         self, bench: RobotBench, simulation: Simulation, station: Station, observer: Observer
     ) -> None:
-        self.observer = observer
+        self.observer, self.meter = observer, Meter()
         self.simulation, self.station = simulation, station
         self._bench = bench
         self._name = bench.posture.part
@@ -209,11 +212,15 @@ class RobotHand:
 
     def _run(self, phase: Phase) -> Outcome:
         """Run one phase, recorded; what the bag cannot hold is a verdict on the trial."""
-        self.observer.begin(phase.name, self.simulation.time)
+        simulation, kind = self.simulation, class_of(phase, self.station.in_hand)
+        self.observer.begin(phase.name, simulation.time)
+        cpu, begun = simulation.stepping_cpu, simulation.time
         try:
-            return self.simulation.run_phase(replace(phase, every_step=self._record))
+            return simulation.run_phase(replace(phase, every_step=self._record))
         except CellError as error:
             raise self.observer.failure(str(error)) from error
+        finally:
+            self.meter.add(kind, simulation.stepping_cpu - cpu, simulation.time - begun)
 
     def _record(self, running: Running) -> None:
         self.observer.step(running.steps, running.time)

@@ -16,6 +16,7 @@ from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer
+from experiments.speed.meter import Meter
 from planning.operations.pick_place.phases import SETTLE_TIME
 from planning.operations.placement import upright
 from planning.operations.push.phases import PushLine
@@ -87,6 +88,11 @@ class Hand(Protocol):
         ...
 
     @property
+    def meter(self) -> Meter:
+        """CPU time spent stepping, by class of what goes on."""
+        ...
+
+    @property
     def simulation(self) -> Clock:
         """The simulation of the trial."""
         ...
@@ -135,6 +141,7 @@ class TrialRecord:
         failure: The phase that failed and the evidence; None if all phases ran.
         log: Arrays of the trial.
         sim_seconds, cpu_seconds: Simulated time, and CPU time spent stepping [s].
+        meter: The same by class of what goes on.
     """
 
     planned: RigidTransform
@@ -149,6 +156,7 @@ class TrialRecord:
     log: dict[str, np.ndarray] = field(default_factory=dict)
     sim_seconds: float = 0.0
     cpu_seconds: float = 0.0
+    meter: Meter = field(default_factory=Meter)
 
 
 def planned_pose(
@@ -215,6 +223,7 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
     trial.log = observer.log.arrays()
     clock = hand.simulation
     trial.sim_seconds, trial.cpu_seconds = clock.time, clock.stepping_cpu
+    trial.meter = hand.meter
     return trial
 
 

@@ -14,6 +14,8 @@ from pydrake.systems.framework import Context
 from cell.errors import RunFailure
 from experiments.paper.rig.rig import HandPose, Rig
 from experiments.paper.rig.stage import Observer
+from experiments.speed.meter import Meter
+from experiments.speed.phase_class import classify
 from planning.operations.stroke import Stroke
 
 
@@ -76,6 +78,7 @@ class RigSimulation:
         root: Context of the diagram.
         observer: Of part and jig.
         stepping_cpu: CPU seconds spent stepping so far.
+        meter: The same by class of what goes on.
     """
 
     def __init__(
@@ -87,8 +90,10 @@ class RigSimulation:
         self.root: Context = self.simulator.get_mutable_context()
         self.observer = Observer(rig, self.root)
         self.stepping_cpu = 0.0
+        self.meter = Meter()
         self.steps = 0
         self.pose = pose
+        self._jaws_move = False
         rig.set_up(self.root, X_WJ, X_WP, rig.joints(pose))
         self.simulator.Initialize()
 
@@ -106,10 +111,12 @@ class RigSimulation:
 
     def begin(self, name: str) -> None:
         """Start a phase; the log and failures name it."""
+        self._jaws_move = False
         self.observer.begin(name, self.time)
 
     def jaws(self, opening: float, force: float = 0.0) -> None:
         """Drive the tip pads to an opening [m], pressing with a force per pad [N] there."""
+        self._jaws_move = True
         self.rig.gripper.command(self.root, opening, force)
 
     def press_with_part(self) -> None:
@@ -168,7 +175,7 @@ class RigSimulation:
             self.pose = HandPose(start.p_WT - [0, 0, depth], start.turn, start.tilt)
             q = self.rig.joints(self.pose)
             self.rig.drive.set_target(self.root, q, np.array([0, 0, -speed, 0, 0]))
-            self.step()
+            self.step(moves=True)
             if self.observer.latest[5] - hanging >= force:
                 self.rig.drive.set_target(self.root, q, np.zeros(5))
                 return True
@@ -179,17 +186,22 @@ class RigSimulation:
         for k in range(1, round(path.duration / self.time_step) + 2):
             # The implicit drive reaches the target at the end of the step.
             self.rig.drive.set_target(self.root, *path.at(k * self.time_step))
-            self.step()
+            self.step(moves=True)
 
     # Stepping.
 
-    def step(self) -> None:
+    def step(self, *, moves: bool = False) -> None:
         """Advance the simulation by one step and record it.
+
+        Args:
+            moves: Whether the hand is on its way; jaws that were told to move in the present phase
+                count as well.
 
         Raises:
             PhaseFailed: The part fell off, the fixture cannot hold its imprint, the solver failed
                 or the state is not finite.
         """
+        awake = not self.rig.jig_base.asleep(self.root)  # It sleeps when the part does.
         start = time.process_time()
         self.steps += 1
         try:
@@ -200,4 +212,7 @@ class RigSimulation:
         except RuntimeError as error:
             raise self.observer.failure(f"solver failure: {str(error).splitlines()[0]}") from error
         self.observer.step(self.steps, self.time)
-        self.stepping_cpu += time.process_time() - start
+        spent = time.process_time() - start
+        self.stepping_cpu += spent
+        kind = classify(moves=moves or self._jaws_move, awake=awake)
+        self.meter.add(kind, spent, self.time_step)
