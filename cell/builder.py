@@ -21,7 +21,7 @@ from cell.errors import InputError, UnknownName
 from cell.fixtures import add_fixture
 from cell.fixtures.base import Fixture
 from cell.fixtures.wiring import wire_fixture
-from cell.link_policy import Policy
+from cell.link_policy import add_links
 from cell.machines.arm import Arm
 from cell.machines.devices import add_arms, make_drives
 from cell.machines.drive import JointDrive
@@ -190,10 +190,8 @@ def add_cell(
     if extend is not None:
         extend(plant, scene_graph)
     grippers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Gripper)]
-    policy = Policy.of(grippers, fixture, parts, threads)
-    most = most_links(config, len(parts.by_name))
-    spare = (next((part.body for part in parts), workcell.base), workcell.base)
-    links = ContactLinks(plant, scene_graph, policy, most, spare)
+    contact = config.simulation.contact
+    links = add_links(plant, scene_graph, contact, grippers, fixture, list(parts), threads)
     plant.Finalize()
 
     bearers = (workcell.base, workcell.plate)
@@ -251,14 +249,6 @@ def _check_names(builder: DiagramBuilder, *planned: str) -> None:
             'of its own, add_cell(..., name="left_cell"), which becomes their prefix'
             f"{'.' if planned else ', in a new builder.'}"
         )
-
-
-def most_links(config: CellConfig, parts: int) -> int:
-    """Return how many contacts may be linked at a time in a cell with some parts.
-
-    Each part has a seat or a head; a held one has two jaws more, a fixed one the fixture.
-    """
-    return parts + 4 if parts and config.simulation.contact == "linked" else 0
 
 
 def plant_config(config: CellConfig) -> MultibodyPlantConfig:

@@ -7,15 +7,17 @@ caller's own, are never linked.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.geometry import SceneGraph
+from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
-from cell.contact.links import Mating
+from cell.contact.links import ContactLinks, Mating
 from cell.fixtures.base import Fixture
 from cell.machines.gripper import Gripper
 from cell.workpieces.parts import LoosePart
@@ -142,3 +144,31 @@ TABLE = (
     Rule((SCREW, PART), "the head of a tightened bolt", Policy.locked),
 )
 RULES = {rule.kinds: rule for rule in TABLE}
+
+
+def add_links(
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    contact: str,
+    grippers: Iterable[Gripper],
+    fixture: Fixture,
+    parts: Sequence[LoosePart],
+    threads: Threads | None = None,
+) -> ContactLinks:
+    """Add the links of a cell, before the plant is finalized.
+
+    Args:
+        plant: Not finalized yet.
+        scene_graph: The plant's.
+        contact: "linked" or "full", as `simulation.contact`.
+        grippers: Whose jaws may be linked to a part.
+        fixture: Holds the first part.
+        parts: Loose ones.
+        threads: Of the bolts among them; None: there are none.
+    """
+    policy = Policy.of(grippers, fixture, parts, threads)
+    if contact == "full" or not parts:
+        return ContactLinks(plant, scene_graph, policy, most=0)
+    # Each part has a seat or a head; a held one has two jaws more, a fixed one the fixture.
+    spare = (parts[0].body, fixture.base)
+    return ContactLinks(plant, scene_graph, policy, len(parts) + 4, spare)

@@ -105,7 +105,7 @@ class Sleep(LeafSystem):
             self._joints[int(body.index())].Lock(context)
             self._set_contact(root, body, apart_from, active=False)
             if self._links is not None:
-                self._links.pause(root, body)
+                self._links.pause(root, body, apart_from)
 
     def wake(self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody] = ()) -> None:
         """Let a body move again, from rest; arguments as of `put_to_sleep`."""
@@ -115,7 +115,7 @@ class Sleep(LeafSystem):
             self._set_contact(root, body, apart_from, active=True)
             self._joints[int(body.index())].Unlock(context)
             if self._links is not None:
-                self._links.resume(root, body)
+                self._links.resume(root, body, apart_from)
 
     def _set_contact(
         self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody], *, active: bool

@@ -33,9 +33,8 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.configuration.config import CellConfig
 from cell.configuration.sections import entries
-from cell.errors import CellError, InputError
 from cell.products.loading import load_product
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, exit_code
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases
 from experiments.paper.place_push import cases_of
@@ -241,11 +240,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(
         RobustnessOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
     )
-    try:
-        return run(options)
-    except CellError as error:
-        print(f"push_robustness: {error}", file=sys.stderr)
-        return 2 if isinstance(error, InputError) else 1
+    return exit_code("push_robustness", lambda: run(options))
 
 
 def run(options: RobustnessOptions) -> int:

@@ -21,10 +21,9 @@ from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
-from cell.errors import CellError, InputError
 from cell.products.loading import load_product
 from experiments.cli.assemble import Assemble
-from experiments.cli.common import BadUsage
+from experiments.cli.common import BadUsage, exit_code
 from experiments.reporting.output import output_folder, write_json
 from planning.operations.limits import Limit
 from planning.operations.registry import OPERATIONS
@@ -48,14 +47,10 @@ class RepeatOptions:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the script; return 0 if every run succeeded, 1 if one failed, 2 for bad input."""
-    try:
-        options = tyro.cli(
-            RepeatOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
-        )
-        return run_all(options)
-    except CellError as error:
-        print(f"repeat: {error}", file=sys.stderr)
-        return 2 if isinstance(error, InputError) else 1
+    options = tyro.cli(
+        RepeatOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
+    )
+    return exit_code("repeat", lambda: run_all(options))
 
 
 def run_all(options: RepeatOptions) -> int:

@@ -34,12 +34,12 @@ import tyro
 from rich.console import Console
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, arg
 
-from cell.errors import CellError, InputError
+from cell.errors import InputError
 from cell.products.loading import load_product
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 from experiments.assembly.prepare import running_cell
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, exit_code
 from experiments.reporting.output import output_folder, whole_file, write_json
 from experiments.reporting.provenance import finite, versions
 from experiments.speed.calibration import Kernel
@@ -255,11 +255,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     options = tyro.cli(
         SpeedOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
     )
-    try:
-        return run(options)
-    except CellError as error:
-        print(f"speed_benchmark: {error}", file=sys.stderr)
-        return 2 if isinstance(error, InputError) else 1
+    return exit_code("speed_benchmark", lambda: run(options))
 
 
 if __name__ == "__main__":

@@ -236,19 +236,45 @@ def test_a_sleeping_body_keeps_its_link_without_springs() -> None:
     assert block.linked
 
 
-def test_a_body_on_a_stand_is_not_linked() -> None:
-    """Whoever locks its joint unlocks it without notice: nothing would hold it then."""
+def test_a_body_that_was_locked_on_a_stand_is_held_when_it_is_let_go() -> None:
+    """Whoever locks its joint does so without notice."""
     block = Block(linked=True)
     block.links.clear(block.root)
     joint = block.plant.GetJointByName("block")
     joint.Lock(block.context)
     for _ in range(100):
         block.step(np.zeros(3))
-    assert not block.linked
     joint.Unlock(block.context)
+    z = block.plant.GetPositions(block.context)[6]
     for _ in range(100):
         block.step(np.zeros(3))
     assert block.linked
+    assert block.plant.GetPositions(block.context)[6] == pytest.approx(z, abs=2e-6)
+
+
+def test_a_table_that_sleeps_apart_from_others_goes_on_bearing_the_block() -> None:
+    """As the jig's base does, which sleeps apart from the force plate only."""
+    block = Block(linked=True)
+    start = block.plant.GetPositions(block.context).copy()
+    world = block.plant.world_body()
+    block.links.pause(block.root, block.table, [world])
+    for _ in range(50):
+        block.step(np.zeros(3))
+    block.links.resume(block.root, block.table, [world])
+    assert block.linked
+    np.testing.assert_allclose(block.plant.GetPositions(block.context), start, atol=2e-8)
+
+
+def test_springs_stay_off_until_both_bodies_are_awake() -> None:
+    block = Block(linked=True)
+    for body in (block.body, block.table):
+        block.links.pause(block.root, body)
+    block.links.resume(block.root, block.table)
+    ((pair, own),) = block.links.memory(block.root).installed.items()
+    assert own.sleepers == {int(block.body.index())} and pair
+    block.links.resume(block.root, block.body)
+    ((pair, own),) = block.links.memory(block.root).installed.items()
+    assert not own.sleepers
 
 
 def test_wrench_of_a_link_is_the_load() -> None:

@@ -27,13 +27,15 @@ from cell.contact.springs import TANGENTIAL, Springs, line_wrenches
 Array = NDArray[np.float64]
 
 # Polygons may pull with this share of the normal force, and friction be exceeded by this share of
-# what it could bear, before the springs count as wrong: half of what full contact may differ by.
+# what it could bear, before the springs count as wrong: half of the 2 % within which a link shall
+# let go at the load at which full contact does [A].
 TOLERANCE = 0.01
 # Polygons are the same ones while bodies move by less [m]: a fifth of the clearance of a tight fit,
 # and of the depth of a frozen bed's contact [A].
 FAR = 5e-5
-# The contact is not checked again before its force has changed by this share of the normal force.
+# A contact is not checked again before its force has changed by this share of the normal one [A].
 NEGLIGIBLE = 0.003
+# Tries to find friction that balances the load; a patch near its limit takes most [A].
 REDISTRIBUTIONS = 12
 
 

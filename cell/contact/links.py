@@ -1,9 +1,9 @@
 """Links in a cell: contacts that stick are replaced by springs, and come back when they must.
 
 Area contact forms and ends every grip, seat and imprint. In between, while two bodies stick to each
-other, their polygons only say again and again what six springs say as well, at a tenth of the cost.
-Links are checked every few steps; a contact that would open, slide or yield, or has moved too far,
-is given back to Drake.
+other, their polygons only say again and again what six springs say as well, for a fraction of the
+time. Links are checked every few steps; a contact that would open, slide or yield, or has moved too
+far, is given back to Drake.
 
 `simulation.contact: full` leaves all of it out.
 """
@@ -11,7 +11,7 @@ is given back to Drake.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
@@ -59,12 +59,15 @@ class Installed:
         slots: (6,) numbers of the springs that it uses.
         hidden: (k, 2) numbers of the geometries of A and B that it has taken out of contact.
         until: It ends when the policy says something else than this.
+        sleepers: Numbers of those of the two bodies that sleep without contact to the other one:
+            while there is any, the springs are off.
     """
 
     link: Link
     slots: tuple[int, ...]
     hidden: Array
     until: object
+    sleepers: frozenset[int] = frozenset()
 
 
 @dataclass
@@ -111,7 +114,7 @@ class ContactLinks(LeafSystem):
         scene_graph: The plant's.
         policy: Which contacts may be linked.
         most: Links at a time; 0: contact is always full.
-        spare: A free body and another one, neither the world: see `PlantSide`.
+        spare: A free body and another one, neither the world (see `PlantSide`); None: most is 0.
 
     Attributes:
         policy: As given.
@@ -123,7 +126,7 @@ class ContactLinks(LeafSystem):
         scene_graph: SceneGraph,
         policy: Sticking,
         most: int,
-        spare: tuple[RigidBody, RigidBody],
+        spare: tuple[RigidBody, RigidBody] | None = None,
     ) -> None:
         super().__init__()
         self._plant, self.policy, self._most = plant, policy, most
@@ -160,17 +163,29 @@ class ContactLinks(LeafSystem):
         for pair in self._of(root, body):
             self._end(root, pair, "geometry")
 
-    def pause(self, root: Context, body: RigidBody) -> None:
-        """Switch the springs of a body off while it sleeps."""
-        for pair in self._of(root, body):
-            self._side.switch(root, self.memory(root).installed[pair].slots, on=False)
+    def pause(self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody] = ()) -> None:
+        """Switch the springs of a body off while it sleeps.
 
-    def resume(self, root: Context, body: RigidBody) -> None:
-        """Switch them on again, where the contact still sticks."""
-        context = self._plant.GetMyContextFromRoot(root)
-        for pair in self._of(root, body):
-            if not self._side.asleep(context, pair) and not self._ended_by_check(root, pair):
-                self._side.switch(root, self.memory(root).installed[pair].slots, on=True)
+        Args:
+            root: Of the diagram.
+            body: That falls asleep.
+            apart_from: Only its springs to these bodies; empty: all of them.
+        """
+        for pair in self._of(root, body, apart_from):
+            own = self.memory(root).installed[pair]
+            self._set_sleepers(root, pair, own.sleepers | {int(body.index())})
+
+    def resume(self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody] = ()) -> None:
+        """Switch them on again, where the contact still sticks; arguments as of `pause`."""
+        for pair in self._of(root, body, apart_from):
+            sleepers = self.memory(root).installed[pair].sleepers - {int(body.index())}
+            if sleepers or not self._ended_by_check(root, pair):
+                self._set_sleepers(root, pair, sleepers)
+
+    def _set_sleepers(self, root: Context, pair: Pair, sleepers: frozenset[int]) -> None:
+        memory = self._changed(root)
+        own = memory.installed[pair] = replace(memory.installed[pair], sleepers=sleepers)
+        self._side.switch(root, own.slots, on=not sleepers)
 
     # Readings.
 
@@ -213,10 +228,11 @@ class ContactLinks(LeafSystem):
     def _check(self, root: Context) -> None:
         context, memory = self._plant.GetMyContextFromRoot(root), self.memory(root)
         for pair in list(memory.installed):
-            if not self._side.asleep(context, pair) and not self._ended_by_check(root, pair):
-                own = memory.installed[pair]
-                if own.link.relax(*self._side.poses(context, pair)):
-                    self._side.set_springs(root, pair, own.slots, own.link)
+            own = memory.installed[pair]
+            if own.sleepers or self._ended_by_check(root, pair):
+                continue
+            if own.link.relax(*self._side.poses(context, pair)):
+                self._side.set_springs(root, pair, own.slots, own.link)
 
     def _ended_by_check(self, root: Context, pair: Pair) -> bool:
         """Give a contact back if it does not stick any more; return whether it does not."""
@@ -233,11 +249,8 @@ class ContactLinks(LeafSystem):
         seen: dict[Pair, tuple[Array, int]] = {}
         for pair, contacts in self._side.contacts(context).items():
             until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
-            # Drake 1.58 crashes with the world as a body of a distance constraint. A body that is
-            # locked and yet touches, as on a stand, is let go without notice.
+            # Drake 1.58 crashes with the world as a body of a distance constraint.
             if until is None or pair in memory.installed or 0 in pair:
-                continue
-            if self._side.asleep(context, pair):
                 continue
             X_WA, X_WB = self._side.poses(context, pair)
             now = X_WB.InvertAndCompose(X_WA).GetAsMatrix34()
@@ -283,8 +296,7 @@ class ContactLinks(LeafSystem):
     def _install(self, root: Context, pair: Pair, own: Installed) -> None:
         self._changed(root).installed[pair] = own
         self._side.set_springs(root, pair, own.slots, own.link)
-        asleep = self._side.asleep(self._plant.GetMyContextFromRoot(root), pair)
-        self._side.switch(root, own.slots, on=not asleep)
+        self._side.switch(root, own.slots, on=not own.sleepers)
         self._side.hide(root, pair, own.hidden, hidden=True)
 
     def _end(self, root: Context, pair: Pair, reason: str) -> None:
@@ -294,8 +306,11 @@ class ContactLinks(LeafSystem):
         self._side.switch(root, own.slots, on=False)
         self._side.hide(root, pair, own.hidden, hidden=False)
 
-    def _of(self, root: Context, body: RigidBody) -> list[Pair]:
-        return [pair for pair in self.memory(root).installed if int(body.index()) in pair]
+    def _of(self, root: Context, body: RigidBody, others: Sequence[RigidBody] = ()) -> list[Pair]:
+        """Return the linked pairs of a body with some others; with none given, with any."""
+        own, wanted = int(body.index()), {int(other.index()) for other in others}
+        found = [pair for pair in self.memory(root).installed if own in pair]
+        return [pair for pair in found if not wanted or wanted.intersection(pair)]
 
     # Saving.
 
@@ -304,7 +319,12 @@ class ContactLinks(LeafSystem):
         memory, name = self.memory(root), self._side.name
         return {
             "links": {
-                name(pair): own.link.arrays() | {"slots": np.array(own.slots), "hidden": own.hidden}
+                name(pair): own.link.arrays()
+                | {
+                    "slots": np.array(own.slots),
+                    "hidden": own.hidden,
+                    "sleepers": np.array(sorted(own.sleepers), dtype=int),
+                }
                 for pair, own in memory.installed.items()
             },
             "watched": {
@@ -334,8 +354,14 @@ class ContactLinks(LeafSystem):
         for name, arrays in state.get("links", {}).items():
             pair = pair_of(name)
             until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
-            slots, hidden = tuple(map(int, arrays["slots"])), arrays["hidden"]
-            self._install(root, pair, Installed(Link.from_arrays(arrays), slots, hidden, until))
+            own = Installed(
+                link=Link.from_arrays(arrays),
+                slots=tuple(map(int, arrays["slots"])),
+                hidden=arrays["hidden"],
+                until=until,
+                sleepers=frozenset(map(int, arrays["sleepers"])),
+            )
+            self._install(root, pair, own)
 
 
 def _way(then: Array, now: Array) -> float:

@@ -20,6 +20,7 @@ from pydrake.multibody.plant import (
 from pydrake.multibody.tree import (
     BodyIndex,
     JacobianWrtVariable,
+    MultibodyConstraintId,
     RigidBody,
 )
 from pydrake.systems.framework import Context
@@ -48,7 +49,7 @@ class PlantSide:
         scene_graph: The plant's.
         most: Links at a time.
         spare: Two bodies that springs without use join: a free one, and not the world, with which
-            Drake 1.58 crashes.
+            Drake 1.58 crashes; None if there are no springs.
     """
 
     def __init__(
@@ -56,17 +57,19 @@ class PlantSide:
         plant: MultibodyPlant,
         scene_graph: SceneGraph,
         most: int,
-        spare: tuple[RigidBody, RigidBody],
+        spare: tuple[RigidBody, RigidBody] | None,
     ) -> None:
         self.plant, self.scene_graph = plant, scene_graph
-        first, second = spare
-        # Too soft to matter: a new Context has them switched on.
-        self._constraints = [
-            plant.AddDistanceConstraint(
-                first, np.zeros(3), second, np.zeros(3), LENGTH, stiffness=1e-9, damping=0.0
-            )
-            for _ in range(SPRINGS * most)
-        ]
+        self._constraints: list[MultibodyConstraintId] = []
+        if spare is not None:
+            first, second = spare
+            # Too soft to matter: a new Context has them switched on.
+            self._constraints = [
+                plant.AddDistanceConstraint(
+                    first, np.zeros(3), second, np.zeros(3), LENGTH, stiffness=1e-9, damping=0.0
+                )
+                for _ in range(SPRINGS * most)
+            ]
 
     # Bodies.
 
@@ -79,10 +82,6 @@ class PlantSide:
         """Return X_WA and X_WB."""
         A, B = (self.plant.EvalBodyPoseInWorld(context, body) for body in self.bodies(pair))
         return A, B
-
-    def asleep(self, context: Context, pair: Pair) -> bool:
-        """Return whether one of the two sleeps."""
-        return any(body.is_locked(context) for body in self.bodies(pair))
 
     def name(self, pair: Pair) -> str:
         """Return the name under which a pair is saved."""

@@ -41,16 +41,12 @@ class Polygons:
             A_is_M: Whether geometry M, not N, is one of body A.
             friction: Coefficient of friction of the two.
         """
-        mesh, field = surface.poly_mesh_W(), surface.poly_e_MN()
-        faces = range(mesh.num_faces())
-        points = np.array([mesh.element_centroid(face) for face in faces])
-        # Drake's normals point out of N into M.
-        normals = np.array([mesh.face_normal(face) for face in faces])
+        points, normals, areas, pressures = read_faces(surface)
         return Polygons(
             points=points,
             normals=normals if A_is_M else -normals,
-            areas=np.array([mesh.area(face) for face in faces]),
-            pressures=np.array([field.EvaluateCartesian(f, points[f]) for f in faces]),
+            areas=areas,
+            pressures=pressures,
             gradients=_gradients(surface, normals),
             friction=np.full(len(points), friction),
         )
@@ -66,6 +62,20 @@ class Polygons:
 
 
 FIELDS = tuple(Polygons.__dataclass_fields__)
+
+
+def read_faces(surface: ContactSurface) -> tuple[Array, Array, Array, Array]:
+    """Return centroids (n, 3), normals (n, 3), areas (n,) and pressures (n,) of a surface.
+
+    In W, SI units; Drake's normals point out of N into M.
+    """
+    mesh, field = surface.poly_mesh_W(), surface.poly_e_MN()
+    faces = range(mesh.num_faces())
+    points = np.array([mesh.element_centroid(face) for face in faces])
+    normals = np.array([mesh.face_normal(face) for face in faces])
+    areas = np.array([mesh.area(face) for face in faces])
+    pressures = np.array([field.EvaluateCartesian(face, points[face]) for face in faces])
+    return points, normals, areas, pressures
 
 
 def _gradients(surface: ContactSurface, normals: Array) -> Array:

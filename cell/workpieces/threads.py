@@ -75,7 +75,8 @@ class Threads(LeafSystem):
         Raises:
             UnknownName: No such bolt; so do all readings and commands by name.
         """
-        return self.engagements(root)[self[bolt].screw.part]
+        row = list(self._threads).index(self[bolt].screw.part)
+        return Engagement.of(self._rows(root)[row])
 
     def state(self, root: Context, bolt: str) -> ThreadState:
         """Return the state of one thread."""

@@ -23,13 +23,12 @@ from pydrake.multibody.tree import (
 )
 from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
-from cell.builder import most_links, plant_config
+from cell.builder import plant_config
 from cell.configuration.config import CellConfig
-from cell.contact.links import ContactLinks
 from cell.fixtures import add_fixture
 from cell.fixtures.soft_jig import SurfaceSamples
 from cell.fixtures.wiring import wire_fixture
-from cell.link_policy import Policy
+from cell.link_policy import add_links
 from cell.machines.drive import JointDrive
 from cell.machines.gripper import Gripper, GripperDrive
 from cell.machines.grippers import HAND_E
@@ -160,8 +159,8 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     fixture.add_part(plant, loose.body, loose.part.mesh)
     wrist, hand = _add_carriage(plant)
     gripper = Gripper.add(plant, hand, "gripper", HAND_E, jaws)
-    policy, spare = Policy.of([gripper], fixture, [loose]), (loose.body, workcell.base)
-    links = ContactLinks(plant, scene_graph, policy, most_links(config, 1), spare)
+    contact = config.simulation.contact
+    links = add_links(plant, scene_graph, contact, [gripper], fixture, [loose])
     plant.Finalize()
     bearers = (workcell.base, workcell.plate)
     sleeper = wire_fixture(builder, plant, scene_graph, fixture, bearers, links).sleeper
