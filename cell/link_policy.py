@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,6 +19,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
 from cell.contact.links import ContactLinks, Mating
+from cell.contact.plant_side import Pair
 from cell.fixtures.base import Fixture
 from cell.machines.gripper import Gripper
 from cell.workpieces.parts import LoosePart
@@ -48,15 +50,14 @@ class Policy:
     """The table, applied to the bodies of one cell.
 
     Attributes:
-        kinds: Of the bodies that may be linked, by the number of the body.
-        names: Of the same bodies: of the part, of the gripper, of the fixture.
+        rows: By the numbers of two bodies that may be linked: the rule, and their names in the
+            order of the rule: of the part, of the gripper, of the fixture.
         grippers: By name.
         fixture: What holds the first part.
         threads: Of the bolts; None: there are none.
     """
 
-    kinds: Mapping[int, str]
-    names: Mapping[int, str]
+    rows: Mapping[Pair, tuple[Rule, str, str]]
     grippers: Mapping[str, Gripper]
     fixture: Fixture
     threads: Threads | None
@@ -79,26 +80,25 @@ class Policy:
             index, name = int(part.body.index()), part.part.name
             kinds[index] = SCREW if threads is not None and name in threads else PART
             names[index] = name
-        return Policy(kinds, names, by_name, fixture, threads)
+        rows = {
+            (min(a, b), max(a, b)): (RULES[kinds[a], kinds[b]], names[a], names[b])
+            for a, b in permutations(kinds, 2)
+            if (kinds[a], kinds[b]) in RULES
+        }
+        return Policy(rows, by_name, fixture, threads)
 
-    def until(self, root: Context, A: RigidBody, B: RigidBody, mating: Mating) -> object | None:
+    def until(self, root: Context, pair: Pair, mating: Mating) -> object | None:
         """Return what a link between two bodies lasts until the change of; None: no link.
 
         Args:
             root: Context of the diagram.
-            A: One body.
-            B: The other.
+            pair: Numbers of the bodies.
             mating: Names of the two parts of each pair that is being mated.
         """
-        a, b = int(A.index()), int(B.index())
-        for one, other in ((a, b), (b, a)):
-            rule = RULES.get((self.kinds.get(one, ""), self.kinds.get(other, "")))
-            if rule is not None:
-                pair = self.names[one], self.names[other]
-                if frozenset(pair) in mating:
-                    return None
-                return rule.until(self, root, *pair)
-        return None
+        if pair not in self.rows:
+            return None
+        rule, *names = self.rows[pair]
+        return None if frozenset(names) in mating else rule.until(self, root, *names)
 
     def limits(
         self, root: Context, A: RigidBody, B: RigidBody, normals_W: NDArray[np.float64]

@@ -19,10 +19,11 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
 from cell.contact.polygons import Polygons
 from cell.contact.springs import TANGENTIAL, Springs, line_wrenches
+from cell.vectors import cross, exact_pose
 
 Array = NDArray[np.float64]
 
@@ -109,11 +110,10 @@ class Link:
 
     def wrench(self, X_WA: RigidTransform, X_WB: RigidTransform) -> Array:
         """Return the wrench (6,) that A feels at poses of the bodies, about Wo."""
-        return self.springs.lines.T @ self._forces(self._displacement(X_WA, X_WB))
+        return self.springs.lines.T @ self._forces(self.displacement(X_WA, X_WB))
 
-    def violation(self, X_WA: RigidTransform, X_WB: RigidTransform) -> str | None:
-        """Return why full contact has to come back at poses of the bodies: None if it has not."""
-        displacement = self._displacement(X_WA, X_WB)
+    def violation(self, displacement: Array) -> str | None:
+        """Return why full contact has to come back at a `displacement`: None if it has not."""
         if np.max(np.sum(self._moved(displacement) ** 2, axis=1)) > FAR**2:
             return "displacement"
         forces = self._forces(displacement)
@@ -124,7 +124,7 @@ class Link:
         own = np.linalg.solve(self.springs.lines, elongations).astype(np.float64)
         return self._overload(self._moved(own))
 
-    def relax(self, X_WA: RigidTransform, X_WB: RigidTransform) -> bool:
+    def relax(self, displacement: Array) -> bool:
         """Let the bodies return to where the contact itself would hold them under this load.
 
         The installed springs give way more than the contact does. Their preload is raised by what
@@ -136,7 +136,7 @@ class Link:
         """
         if self.softening == 1.0:
             return False
-        forces = self._forces(self._displacement(X_WA, X_WB))
+        forces = self._forces(displacement)
         elongations = (self.springs.forces - forces) / self.springs.stiffness
         preload = forces + self.installed_stiffness * elongations
         changed = np.abs(preload - self.preload).sum() > NEGLIGIBLE * self.normal_force
@@ -144,7 +144,7 @@ class Link:
             self.preload = preload
         return bool(changed)
 
-    def _displacement(self, X_WA: RigidTransform, X_WB: RigidTransform) -> Array:
+    def displacement(self, X_WA: RigidTransform, X_WB: RigidTransform) -> Array:
         """Return how A has moved relative to B (6,): rotation vector [rad], way of Wo [m].
 
         Small rotations only; in W as it was seen from B when they were linked.
@@ -160,7 +160,7 @@ class Link:
 
     def _moved(self, displacement: Array) -> Array:
         """Return the ways (n, 3) of A at the polygons."""
-        return displacement[3:] + np.cross(displacement[:3], self.polygons.points)
+        return displacement[3:] + cross(displacement[:3], self.polygons.points)
 
     def _overload(self, moved: Array, share: float = 1.0) -> str | None:
         """Return what the polygons cannot bear after ways (n, 3) of A [m], if anything.
@@ -211,11 +211,11 @@ class Link:
         centre = np.average(points, axis=0, weights=self.polygons.areas)
         arms = points - centre
         about = wrench.copy()
-        about[:3] -= np.cross(centre, wrench[3:])
+        about[:3] -= cross(centre, wrench[3:])
         # Columns: ways of the polygons for unit displacements about the centre, along the faces.
         ways = np.zeros((len(arms), 3, 6))
         ways[:, :, 3:] = np.eye(3)
-        ways[:, :, :3] = np.cross(np.eye(3), arms[:, None]).transpose(0, 2, 1)
+        ways[:, :, :3] = cross(np.eye(3), arms[:, None]).transpose(0, 2, 1)
         ways -= normals[:, :, None] * np.einsum("ni,nij->nj", normals, ways)[:, None, :]
         K = np.einsum("n,nij,nik->jk", stiffness, ways, ways)
         size = np.sqrt(np.mean(np.sum(arms**2, axis=1)))
@@ -230,7 +230,7 @@ class Link:
         return {
             "X_WA": self.X_WA.GetAsMatrix34(),
             "X_WB": self.X_WB.GetAsMatrix34(),
-            "springs": dict(vars(self.springs)),
+            "springs": {name: getattr(self.springs, name) for name in Springs.__dataclass_fields__},
             "softening": np.array(self.softening),
             "preload": self.preload,
             "polygons": dict(vars(self.polygons)),
@@ -243,8 +243,8 @@ class Link:
     def from_arrays(arrays: Mapping[str, Any]) -> Link:
         """Undo `arrays`."""
         return Link(
-            X_WA=_pose(arrays["X_WA"]),
-            X_WB=_pose(arrays["X_WB"]),
+            X_WA=exact_pose(arrays["X_WA"]),
+            X_WB=exact_pose(arrays["X_WB"]),
             springs=Springs(**arrays["springs"]),
             softening=float(arrays["softening"]),
             preload=arrays["preload"],
@@ -253,8 +253,3 @@ class Link:
             tangential=arrays["tangential"],
             checked=arrays["checked"],
         )
-
-
-def _pose(matrix: Array) -> RigidTransform:
-    """Return the pose of a 3x4 matrix, to the last bit."""
-    return RigidTransform(RotationMatrix(matrix[:, :3]), matrix[:, 3])

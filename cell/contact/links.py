@@ -41,8 +41,8 @@ FEWEST = 4  # Polygons of a contact that resists every displacement.
 class Sticking(Protocol):
     """What says which contacts may be linked: `cell.link_policy`."""
 
-    def until(self, root: Context, A: RigidBody, B: RigidBody, mating: Mating) -> object | None:
-        """Return what a link between two bodies lasts until the change of; None: no link."""
+    def until(self, root: Context, pair: Pair, mating: Mating) -> object | None:
+        """Return what a link of a pair of bodies lasts until the change of; None: no link."""
         ...
 
     def limits(self, root: Context, A: RigidBody, B: RigidBody, normals_W: Array) -> Array:
@@ -178,9 +178,15 @@ class ContactLinks(LeafSystem):
     def resume(self, root: Context, body: RigidBody, apart_from: Sequence[RigidBody] = ()) -> None:
         """Switch them on again, where the contact still sticks; arguments as of `pause`."""
         for pair in self._of(root, body, apart_from):
-            sleepers = self.memory(root).installed[pair].sleepers - {int(body.index())}
-            if sleepers or not self._ended_by_check(root, pair):
+            own = self.memory(root).installed[pair]
+            sleepers = own.sleepers - {int(body.index())}
+            context = self._plant.GetMyContextFromRoot(root)
+            displacement = own.link.displacement(*self._side.poses(context, pair))
+            reason = None if sleepers else own.link.violation(displacement)
+            if reason is None:
                 self._set_sleepers(root, pair, sleepers)
+            else:
+                self._return(root, pair, reason)
 
     def _set_sleepers(self, root: Context, pair: Pair, sleepers: frozenset[int]) -> None:
         memory = self._changed(root)
@@ -222,33 +228,33 @@ class ContactLinks(LeafSystem):
     def _end_unwanted(self, root: Context) -> None:
         memory = self.memory(root)
         for pair, own in list(memory.installed.items()):
-            if self.policy.until(root, *self._side.bodies(pair), memory.mating) != own.until:
+            if self.policy.until(root, pair, memory.mating) != own.until:
                 self._end(root, pair, "command")
 
     def _check(self, root: Context) -> None:
         context, memory = self._plant.GetMyContextFromRoot(root), self.memory(root)
-        for pair in list(memory.installed):
-            own = memory.installed[pair]
-            if own.sleepers or self._ended_by_check(root, pair):
+        for pair, own in list(memory.installed.items()):
+            if own.sleepers:
                 continue
-            if own.link.relax(*self._side.poses(context, pair)):
+            displacement = own.link.displacement(*self._side.poses(context, pair))
+            reason = own.link.violation(displacement)
+            if reason is not None:
+                self._return(root, pair, reason)
+            elif own.link.relax(displacement):
                 self._side.set_springs(root, pair, own.slots, own.link)
 
-    def _ended_by_check(self, root: Context, pair: Pair) -> bool:
-        """Give a contact back if it does not stick any more; return whether it does not."""
-        memory, context = self._changed(root), self._plant.GetMyContextFromRoot(root)
-        reason = memory.installed[pair].link.violation(*self._side.poses(context, pair))
-        if reason is not None:
-            self._end(root, pair, reason)
-            memory.returns[pair] = memory.returns.get(pair, 0) + 1
-        return reason is not None
+    def _return(self, root: Context, pair: Pair, reason: str) -> None:
+        """Give a contact back that does not stick any more."""
+        self._end(root, pair, reason)
+        returns = self._changed(root).returns
+        returns[pair] = returns.get(pair, 0) + 1
 
     def _look(self, root: Context, dt: float) -> None:
         """Link what has been standing still."""
         memory, context = self._changed(root), self._plant.GetMyContextFromRoot(root)
         seen: dict[Pair, tuple[Array, int]] = {}
         for pair, contacts in self._side.contacts(context).items():
-            until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
+            until = self.policy.until(root, pair, memory.mating)
             # Drake 1.58 crashes with the world as a body of a distance constraint.
             if until is None or pair in memory.installed or 0 in pair:
                 continue
@@ -353,7 +359,7 @@ class ContactLinks(LeafSystem):
         memory.ended = Counter({n: int(count) for n, count in state.get("ended", {}).items()})
         for name, arrays in state.get("links", {}).items():
             pair = pair_of(name)
-            until = self.policy.until(root, *self._side.bodies(pair), memory.mating)
+            until = self.policy.until(root, pair, memory.mating)
             own = Installed(
                 link=Link.from_arrays(arrays),
                 slots=tuple(map(int, arrays["slots"])),

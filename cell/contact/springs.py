@@ -18,11 +18,13 @@ six forces are the wrench that the contact carries at the moment: nothing jumps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
 
 from cell.contact.polygons import Polygons
+from cell.vectors import cross
 
 Array = NDArray[np.float64]
 
@@ -70,13 +72,13 @@ class Springs:
         stiffness = np.sum(rows[:, 3:] ** 2, axis=1)
         unit = rows / np.sqrt(stiffness)[:, None]
         directions, torques = unit[:, 3:], unit[:, :3]
-        points = centre + np.cross(directions, torques)
+        points = centre + cross(directions, torques)
         about_centre = wrench.copy()
-        about_centre[:3] -= np.cross(centre, wrench[3:])
+        about_centre[:3] -= cross(centre, wrench[3:])
         forces = np.linalg.solve(unit.T * scale[:, None], about_centre * scale)
         return Springs(points, directions, stiffness, forces)
 
-    @property
+    @cached_property
     def lines(self) -> Array:
         """Wrenches (6, 6) of unit forces of the springs on A, about the origin of W."""
         return line_wrenches(self.points, self.directions)
@@ -84,7 +86,7 @@ class Springs:
 
 def line_wrenches(points: Array, directions: Array) -> Array:
     """Return the wrenches (n, 6), torque first, of unit forces along lines (n, 3), (n, 3)."""
-    return np.concatenate([np.cross(points, directions), directions], axis=1)
+    return np.concatenate([cross(points, directions), directions], axis=1)
 
 
 def stiffness_matrix(polygons: Polygons, centre: Array) -> Array:

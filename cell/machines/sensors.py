@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 from pydrake.common.value import AbstractValue
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.math import SpatialForce
 from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import WeldJoint
@@ -48,11 +50,23 @@ class WrenchSensor(LeafSystem):
 
     def read(self, plant_context: Context) -> np.ndarray:
         """Return the wrench (6,), given the plant's context: the same as the output port's."""
-        forces = self.plant.get_reaction_forces_output_port().Eval(plant_context)
-        R_WJc = self.weld.frame_on_child().CalcPoseInWorld(plant_context).rotation()
-        return _wrench(R_WJc, forces[self._index])
+        (wrench,) = read_all([self], plant_context)
+        return wrench
 
 
-def _wrench(R_WJc, F_CJc_Jc: SpatialForce) -> np.ndarray:
+def read_all(sensors: Sequence[WrenchSensor], plant_context: Context) -> list[np.ndarray]:
+    """Return the wrench (6,) of each of several sensors of one plant, as `WrenchSensor.read`."""
+    # Once for all: Drake hands the forces of every joint over.
+    forces = sensors[0].plant.get_reaction_forces_output_port().Eval(plant_context)
+    return [
+        _wrench(
+            sensor.weld.frame_on_child().CalcRotationMatrixInWorld(plant_context),
+            forces[sensor._index],
+        )
+        for sensor in sensors
+    ]
+
+
+def _wrench(R_WJc: RotationMatrix, F_CJc_Jc: SpatialForce) -> np.ndarray:
     """Drake reports what the joint exerts on its child C, in the joint frame Jc on the child."""
-    return -np.concatenate([R_WJc @ F_CJc_Jc.rotational(), R_WJc @ F_CJc_Jc.translational()])
+    return -(R_WJc.matrix() @ F_CJc_Jc.get_coeffs().reshape(2, 3).T).T.reshape(-1)

@@ -15,6 +15,7 @@ from cell.errors import InputError, UnknownName
 from cell.machines.arm import Arm
 from cell.machines.driver import Driver
 from cell.machines.gripper import Gripper
+from cell.machines.sensors import read_all
 from cell.simulation.identity import identity_of
 from cell.simulation.log import Log
 from cell.simulation.phase import (
@@ -100,7 +101,8 @@ class Simulation:
 
     def read_wrists(self) -> dict[str, np.ndarray]:
         """Return the reading (6,) of each wrist [N m, N], by arm name."""
-        return {name: arm.wrist.read(self.context) for name, arm in self.cell.arms.items()}
+        wrists = [arm.wrist for arm in self.cell.arms.values()]
+        return dict(zip(self.cell.arms, read_all(wrists, self.context), strict=True))
 
     def run(self, phases: Iterable[Phase]) -> None:
         """Run an operation: a generator of phases that receives each `Outcome` back."""

@@ -43,6 +43,7 @@ class Threads(LeafSystem):
     def __init__(self, threads: Mapping[str, Thread], driver: Driver | None) -> None:
         super().__init__()
         self._threads, self._driver = dict(threads), driver
+        self._row_of = {bolt: row for row, bolt in enumerate(self._threads)}
         rows = [Engagement().row() for _ in threads]
         self._index = self.DeclareDiscreteState(np.array(rows).reshape(-1))
 
@@ -75,8 +76,9 @@ class Threads(LeafSystem):
         Raises:
             UnknownName: No such bolt; so do all readings and commands by name.
         """
-        row = list(self._threads).index(self[bolt].screw.part)
-        return Engagement.of(self._rows(root)[row])
+        state = self.GetMyContextFromRoot(root).get_discrete_state(self._index).value()
+        start = 3 * self._row_of[self[bolt].screw.part]
+        return Engagement.of(state[start : start + 3])
 
     def state(self, root: Context, bolt: str) -> ThreadState:
         """Return the state of one thread."""
@@ -156,7 +158,7 @@ class Threads(LeafSystem):
 
     def _remember(self, root: Context, bolt: str, engagement: Engagement) -> None:
         rows = self._rows(root)
-        rows[list(self._threads).index(bolt)] = engagement.row()
+        rows[self._row_of[bolt]] = engagement.row()
         self.GetMyMutableContextFromRoot(root).SetDiscreteState(self._index, rows.reshape(-1))
 
     # Saving.
