@@ -31,9 +31,11 @@ Mating = frozenset[frozenset[str]]  # Names of the two parts of each pair.
 
 LOOK_PERIOD = 0.01  # For contacts that have come to a stand [s] [A].
 CHECK_PERIOD = 0.005  # Of the links [s] [A].
-# A contact stands when it has moved by less than STILL for WAIT [m, s]: 0.5 mm/s, a tenth of the
-# slowest motion of an arm [A]. After a return it has to wait longer, up to PATIENCE times.
-STILL, WAIT, PATIENCE = 1e-5, 0.02, 5
+# A contact stands when it has moved for WAIT [s] at less than CREEP times the time step [m/s]: Drake
+# regularises friction, so that what sticks creeps in proportion to its load and to the step. At
+# 1 ms this is 0.5 mm/s, a tenth of the slowest motion of an arm [A]; a bolt in the jaws creeps at
+# 0.39 mm/s [M]. After a return it has to wait longer, up to PATIENCE times.
+CREEP, WAIT, PATIENCE = 0.5, 0.02, 5
 LEVER = 0.02  # At which a rotation counts as motion [m] [A].
 FEWEST = 4  # Polygons of a contact that resists every displacement.
 
@@ -150,13 +152,15 @@ class ContactLinks(LeafSystem):
     def keep_full(self, root: Context, mating: Mating) -> None:
         """Keep the contacts between parts that are being mated full, until the next call.
 
+        Links that a command has ended, to jaws that open, are gone before the next step is taken.
+
         Args:
             root: Of the diagram.
             mating: Names of the two parts of each pair.
         """
         if mating != self.memory(root).mating:
             self._changed(root).mating = mating
-            self._end_unwanted(root)
+        self._end_unwanted(root)
 
     def release(self, root: Context, body: RigidBody) -> None:
         """Give all contacts of a body back, before its geometry changes."""
@@ -261,7 +265,7 @@ class ContactLinks(LeafSystem):
             X_WA, X_WB = self._side.poses(context, pair)
             now = X_WB.InvertAndCompose(X_WA).GetAsMatrix34()
             then, since = memory.watched.get(pair, (now, memory.steps))
-            if _way(then, now) > STILL:
+            if _way(then, now) > CREEP * dt * WAIT:
                 then, since = now, memory.steps
             patience = WAIT * min(1 + memory.returns.get(pair, 0), PATIENCE)
             if (memory.steps - since) * dt >= patience - dt / 2:

@@ -124,10 +124,10 @@ class Simulation:
         """
         self.log.phases.append((phase.name, self.time))
         self.cell.parts.sleep_all_but(self.root, phase.awake)
-        self.cell.links.keep_full(self.root, phase.mating)
         for event in phase.start:
             event(self)
         run = _PhaseRun(self, phase)
+        self.cell.links.keep_full(self.root, phase.mating)
         while True:
             run.command()
             try:
