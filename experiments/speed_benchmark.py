@@ -37,8 +37,7 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, arg
 from cell.errors import InputError
 from cell.products.loading import load_product
 from cell.products.product import Product
-from cell.simulation.simulation import Simulation
-from experiments.assembly.prepare import running_cell
+from experiments.assembly.prepare import RunningCell
 from experiments.cli.common import BadUsage, Common, exit_code
 from experiments.reporting.output import output_folder, whole_file, write_json
 from experiments.reporting.provenance import finite, versions
@@ -69,7 +68,6 @@ from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import plan
 from planning.operations.operation import Step
 from planning.operations.sequence import steps
-from planning.operations.station import Station
 
 
 @dataclass(frozen=True)
@@ -183,26 +181,25 @@ def measure(
     config, seed = options.common.load_config(), options.common.seed
     if not options.remake:
         try:
-            simulation, station, _ = running_cell(product, config, seed)
-            whole = read_whole_run(folder, simulation, seed)
-            return whole, measured_phases(options, whole, simulation, station, todo)
+            running = RunningCell(product, config, seed)
+            whole = read_whole_run(folder, running)
+            return whole, measured_phases(options, whole, running, todo)
         except Outdated as reason:
             console.print(f"The whole assembly is run: {reason}", markup=False, soft_wrap=True)
-    simulation, station, _ = running_cell(product, config, seed)
+    running = RunningCell(product, config, seed)
     with output_folder(folder), console.status("the whole assembly") as status:
 
         def show(phase: PhaseRun) -> None:
             status.update(f"the whole assembly: {phase.name} done")
 
-        whole = make_whole_run(folder, simulation, station, todo, seed, show)
-    return whole, measured_phases(options, whole, simulation, station, todo)
+        whole = make_whole_run(folder, running, todo, show)
+    return whole, measured_phases(options, whole, running, todo)
 
 
 def measured_phases(
     options: SpeedOptions,
     whole: WholeRun,
-    simulation: Simulation,
-    station: Station,
+    running: RunningCell,
     todo: Sequence[Step],
 ) -> list[Measured]:
     """Measure the phases that the options ask for.
@@ -212,12 +209,16 @@ def measured_phases(
         Outdated: The start states do not fit.
     """
     wanted = dict(chosen(whole.phases, options.phase))
-    kernel, monitor = Kernel(), TimedMonitor(simulation.cell.monitor)
-    simulation.simulator.set_monitor(monitor)
-    found = []
+    kernel, found = Kernel(), []
     for number, step in enumerate(todo):
         own = [phase for phase in wanted if phase.step == number]
-        for kept, phase in resumed(whole, simulation, station, step, own) if own else ():
+        if not own:
+            continue
+        running.switch(step.operation)
+        simulation = running.simulation
+        monitor = TimedMonitor(simulation.cell.monitor)
+        simulation.simulator.set_monitor(monitor)
+        for kept, phase in resumed(whole, running, step, own):
             state, window = whole.state(kept.number), options.window
             cost = measure_phase(simulation, monitor, state, phase, window, options.repeats, kernel)
             found.append(Measured(kept, cost, wanted[kept]))

@@ -25,7 +25,7 @@ from experiments import shaft_insertion
 from experiments.assembly import run as run_module
 from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
-from experiments.assembly.prepare import Disturbance, running_cell
+from experiments.assembly.prepare import Disturbance, RunningCell
 from experiments.assembly.run import Run, go_on
 from planning.assembly_plan.planner import plan
 from planning.operations.grasping import let_go
@@ -129,7 +129,7 @@ def test_disturbance_is_drawn_from_the_seed() -> None:
 
 @pytest.fixture
 def run() -> Run:
-    return Run(*running_cell(PRODUCT, CONFIG, seed=0))
+    return Run(RunningCell(PRODUCT, CONFIG, seed=0))
 
 
 def test_planner_does_not_know_the_disturbance(run: Run) -> None:
@@ -140,7 +140,7 @@ def test_planner_does_not_know_the_disturbance(run: Run) -> None:
     run.station.look()
     assert run.station.pose_of("motor").IsNearlyEqualTo(X_WT @ part.X_TrayP, 1e-9)
     assert run.station.config == CONFIG
-    assert run.disturbance == Disturbance.draw(CONFIG, 0)
+    assert run.running.disturbance == Disturbance.draw(CONFIG, 0)
 
 
 def test_phase_that_fails_stops_the_run(run: Run) -> None:
@@ -175,7 +175,7 @@ def test_run_that_goes_on_remembers_what_the_planner_knew(run: Run) -> None:
     station.fixed, station.driven = ("motor",), ("bolt_1",)
     station.origins["plate"] = origin = station.pose_of("plate")
     station.placements["motor"] = Placement(0.3, origin, np.arange(6.0))
-    again = Run(*running_cell(PRODUCT, CONFIG, seed=0))
+    again = Run(RunningCell(PRODUCT, CONFIG, seed=0))
     left = go_on(again, todo, run_module.final_state(run))
     assert [step.operation.name for step in left] == ["insert_shaft", "tighten_bolts"]
     assert (again.station.fixed, again.station.driven) == (("motor",), ("bolt_1",))
@@ -232,7 +232,7 @@ def some_phases(run: Run, count: int) -> Generator[Phase, Outcome, None]:
 
 def test_same_seed_is_bit_identical(run: Run) -> None:
     """Planning with sampling included: look, approach, descend."""
-    again = Run(*running_cell(PRODUCT, CONFIG, seed=0))
+    again = Run(RunningCell(PRODUCT, CONFIG, seed=0))
     for one in (run, again):
         one.simulation.run(some_phases(one, 3))
     log, other = run.simulation.log.arrays(), again.simulation.log.arrays()
@@ -283,7 +283,7 @@ def test_interrupted_run_continues_bit_identically(placed: Path) -> None:
         simulation.run_phase(hold)
         return save_state(simulation)
 
-    simulations = [running_cell(PRODUCT, CONFIG, seed=0)[0] for _ in range(2)]
+    simulations = [RunningCell(PRODUCT, CONFIG, seed=0).simulation for _ in range(2)]
     restore_state(simulations[0], read_state(placed / "state.npz"))
     middle = rest(simulations[0])
     restore_state(simulations[1], middle)
@@ -305,7 +305,7 @@ def energies_at_rest(state: Path) -> list[float]:
 
     Every part is awake, in the tray and on the jig.
     """
-    simulation, *_ = running_cell(PRODUCT, CONFIG, seed=0)
+    simulation = RunningCell(PRODUCT, CONFIG, seed=0).simulation
     restore_state(simulation, read_state(state))
     parts = list(simulation.cell.parts)
     awake = frozenset(part.part.name for part in parts)

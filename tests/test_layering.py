@@ -18,6 +18,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "bodies": set(),
         "setting": set(),
         "forces": set(),
+        "vectors": set(),
         "contact": set(),
         "sleep": {"contact"},
         "monitor": set(),
@@ -51,13 +52,13 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "jig": set(),
         "plan": {"reporting"},
         "assembly": {"reporting"},
-        "speed": {"reporting"},
+        "speed": {"reporting", "assembly"},
         "paper": {"reporting", "speed"},
         "cli": {"reporting", "plan", "assembly", "paper"},
     },
 }  # fmt: skip
 EVERYWHERE = {
-    "cell": {"bodies", "errors", "paths", "setting", "forces", "sleep"},
+    "cell": {"bodies", "errors", "paths", "setting", "forces", "sleep", "vectors"},
     "planning": set(),
     "experiments": set(),
 }

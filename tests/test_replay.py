@@ -37,7 +37,7 @@ def recording(tmp_path_factory: pytest.TempPathFactory) -> Path:
     cell = add_cell(builder, CellConfig(), load_product("motor_unit"))
     replay.add_to(builder, cell)
     simulation = Simulation(cell.with_diagram(builder.Build()))
-    replay.follow(simulation.root)
+    replay.follow(simulation)
     wait = Phase(MadeUp.WAIT, after(1.5 * MEMBRANE_PERIOD), timeout=1.0)
     simulation.run([wait])
     assert isinstance(cell.fixture, SoftJig)

@@ -26,9 +26,8 @@ from cell.simulation.phase import (
     after,
     motion_finished,
 )
-from cell.simulation.simulation import Simulation
 from experiments import speed_benchmark
-from experiments.assembly.prepare import running_cell
+from experiments.assembly.prepare import RunningCell
 from experiments.paper import regress
 from experiments.speed.calibration import Kernel
 from experiments.speed.layers import LAYERS, TimedMonitor, beginning, measure_phase, probe
@@ -191,26 +190,23 @@ def short_steps(*_: Any) -> list[Step]:
     return [Step("first", operation, ()), Step("second", operation, ())]
 
 
-Twin = tuple[Simulation, Station]
-
-
-def twin(config: CellConfig | None = None) -> Twin:
-    return running_cell(load_product("motor_unit"), config or CellConfig(), 0)[:2]
+def twin(config: CellConfig | None = None, seed: int = 0) -> RunningCell:
+    return RunningCell(load_product("motor_unit"), config or CellConfig(), seed)
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, Twin]]:
+def made(tmp_path_factory: pytest.TempPathFactory) -> Iterator[tuple[Any, RunningCell]]:
     folder = tmp_path_factory.mktemp("states")
-    simulation, station = twin()
+    running = twin()
     watched: list[PhaseRun] = []
-    run = make_whole_run(folder, simulation, station, short_steps(), 0, watched.append)
+    run = make_whole_run(folder, running, short_steps(), watched.append)
     assert watched == list(run.phases)
-    yield run, (simulation, station)
+    yield run, running
 
 
 def test_whole_run_is_read_back(made: Any) -> None:
-    run, (simulation, _) = made
-    assert read_whole_run(run.folder, simulation, 0) == run
+    run, running = made
+    assert read_whole_run(run.folder, running) == run
     classes = [phase.phase_class.value for phase in run.phases]
     assert classes == 2 * ["dwell", "free", "free", "contact"]
     assert [phase.sim_seconds for phase in run.phases] == pytest.approx(8 * [TICK])
@@ -218,28 +214,29 @@ def test_whole_run_is_read_back(made: Any) -> None:
 
 
 def test_states_of_another_seed_or_configuration_are_refused(made: Any) -> None:
-    run, (simulation, _) = made
+    run, running = made
     with pytest.raises(Outdated, match="seed 0, not 1"):
-        read_whole_run(run.folder, simulation, 1)
+        read_whole_run(run.folder, twin(seed=1))
     with pytest.raises(Outdated, match="no start states"):
-        read_whole_run(run.folder / "none", simulation, 0)
-    other, _ = twin(CellConfig().with_changes({"placement.press_force": 21.0}))
+        read_whole_run(run.folder / "none", running)
+    other = twin(CellConfig().with_changes({"placement.press_force": 21.0}))
     with pytest.raises(Outdated, match="another configuration"):
-        read_whole_run(run.folder, other, 0)
+        read_whole_run(run.folder, other)
 
 
 def test_resumed_phase_ends_where_it_ended_in_the_whole_run(made: Any) -> None:
     """Bit by bit, with a servo that goes on from the phase before, too."""
-    run, (simulation, station) = made
+    run, running = made
     wanted = [run.phases[k] for k in (1, 2)]
-    for kept, phase in resumed(run, simulation, station, short_steps()[0], wanted):
+    for kept, phase in resumed(run, running, short_steps()[0], wanted):
+        simulation = running.simulation
         simulation.run_phase(beginning(phase, TICK))
         end = run.state(kept.number + 1)
         assert np.array_equal(simulation.cell.plant.GetPositions(simulation.context), end["q"])
 
 
 def test_resumed_refuses_an_operation_with_other_phases(made: Any) -> None:
-    run, (simulation, station) = made
+    run, running = made
 
     def with_phases(*kinds: Kind) -> Step:
         def other(station: Station, step: Step) -> Iterator[Phase]:
@@ -253,17 +250,18 @@ def test_resumed_refuses_an_operation_with_other_phases(made: Any) -> None:
         (with_phases(Kind.WAIT), "ends before its phase 'creep'"),
     ):
         with pytest.raises(Outdated, match=said):
-            list(resumed(run, simulation, station, step, [run.phases[2]]))
+            list(resumed(run, running, step, [run.phases[2]]))
 
 
 # Layers.
 
 
 def test_layers_add_up_and_leave_the_phase_as_it_was(made: Any) -> None:
-    run, (simulation, station) = made
+    run, running = made
+    simulation, station = running.simulation, running.station
     monitor = TimedMonitor(simulation.cell.monitor)
     simulation.simulator.set_monitor(monitor)
-    (only,) = resumed(run, simulation, station, short_steps()[1], [run.phases[6]])
+    (only,) = resumed(run, running, short_steps()[1], [run.phases[6]])
     servo = cast(Creep, cast(Follow, only[1].commands[station.holder.name]).target)
     calls = servo.calls
     cost = measure_phase(simulation, monitor, run.state(6), only[1], 0.01, 2, Kernel())
@@ -275,7 +273,8 @@ def test_layers_add_up_and_leave_the_phase_as_it_was(made: Any) -> None:
 
 def test_probe_changes_nothing_and_finds_contact(made: Any) -> None:
     """The motor, awake on its tray, costs geometry that it does not cost asleep."""
-    run, (simulation, _) = made
+    _, running = made
+    simulation = running.simulation
     cell, parts = simulation.cell, simulation.cell.parts
     parts.sleep_all_but(simulation.root, ())
     asleep = min(probe(cell, simulation.root)[0] for _ in range(3))

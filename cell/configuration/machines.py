@@ -30,11 +30,24 @@ class SimulationConfig:
         "[M] Linked takes half the time; compared for three assemblies only.",
         choices=("full", "linked"),
     )  # fmt: skip
+    coarse_factor: int = setting(
+        2, "", "Steps are so many times as long in operations that allow it, with linked contact.",
+        "[M] Inserting and placing bolts: forces within 1 % at 2 ms; in full contact bolts slip.",
+        at_least=1, at_most=4,
+    )  # fmt: skip
     log_period: float = setting(
         0.01, "s", "Time between two samples of the log.",
         "[A] Own choice.",
         above=0.0, at_most=10.0,
     )  # fmt: skip
+
+    @property
+    def coarse_time_step(self) -> float:
+        """Time step of operations that allow a coarse one [s].
+
+        Full contact is always stepped finely: what sticks creeps in proportion to the step.
+        """
+        return self.time_step * (self.coarse_factor if self.contact == "linked" else 1)
 
 
 @dataclass(frozen=True)

@@ -31,10 +31,10 @@ Mating = frozenset[frozenset[str]]  # Names of the two parts of each pair.
 
 LOOK_PERIOD = 0.01  # For contacts that have come to a stand [s] [A].
 CHECK_PERIOD = 0.005  # Of the links [s] [A].
-# A contact stands when it has moved for WAIT [s] at less than CREEP times the time step [m/s]: Drake
-# regularises friction, so that what sticks creeps in proportion to its load and to the step. At
-# 1 ms this is 0.5 mm/s, a tenth of the slowest motion of an arm [A]; a bolt in the jaws creeps at
-# 0.39 mm/s [M]. After a return it has to wait longer, up to PATIENCE times.
+# A contact stands when it has moved for WAIT [s] at less than CREEP times the time step [m/s]:
+# Drake regularises friction, so that what sticks creeps in proportion to its load and to the step.
+# At 1 ms this is 0.5 mm/s, a tenth of the slowest motion of an arm [A]; a bolt in the jaws creeps
+# at 0.39 mm/s [M]. After a return it has to wait longer, up to PATIENCE times.
 CREEP, WAIT, PATIENCE = 0.5, 0.02, 5
 LEVER = 0.02  # At which a rotation counts as motion [m] [A].
 FEWEST = 4  # Polygons of a contact that resists every displacement.
@@ -82,7 +82,8 @@ class LinksMemory:
         returns: How often each pair has got its full contact back by a check.
         mating: Pairs of parts whose contact stays full.
         steps: Since the beginning.
-        linked: Sum over the steps of the numbers of links.
+        time: Since the beginning [s].
+        linked: Integral over time of the number of links [s].
         made: Links made so far.
         ended: By reason, links that ended.
     """
@@ -92,7 +93,8 @@ class LinksMemory:
     returns: dict[Pair, int] = field(default_factory=dict)
     mating: Mating = frozenset()
     steps: int = 0
-    linked: int = 0
+    time: float = 0.0
+    linked: float = 0.0
     made: int = 0
     ended: Counter[str] = field(default_factory=Counter)
 
@@ -211,7 +213,7 @@ class ContactLinks(LeafSystem):
     def summary(self, root: Context) -> dict[str, Any]:
         """Return mean number of links, how many were made, and how many ended, by reason."""
         memory = self.memory(root)
-        mean = memory.linked / max(memory.steps, 1)
+        mean = memory.linked / memory.time if memory.time else 0.0
         return {"mean": mean, "made": memory.made, "ended": dict(sorted(memory.ended.items()))}
 
     # Simulation.
@@ -222,7 +224,8 @@ class ContactLinks(LeafSystem):
             return
         memory = self._changed(root)
         memory.steps += 1
-        memory.linked += len(memory.installed)
+        memory.time += dt
+        memory.linked += dt * len(memory.installed)
         self._end_unwanted(root)
         if memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0:
             self._check(root)
@@ -343,14 +346,16 @@ class ContactLinks(LeafSystem):
             },
             "returns": {name(pair): np.array(count) for pair, count in memory.returns.items()},
             "mating": np.array(sorted("|".join(sorted(pair)) for pair in memory.mating), dtype=str),
-            "counts": np.array([memory.steps, memory.linked, memory.made]),
+            "counts": np.array([memory.steps, memory.made]),
+            "times": np.array([memory.time, memory.linked]),
             "ended": {reason: np.array(count) for reason, count in memory.ended.items()},
         }
 
     def clear(self, root: Context) -> None:
-        """End all links, so that what is in contact can be restored."""
+        """End all links, so that what is in contact can be restored or handed over."""
         for pair in list(self.memory(root).installed):
             self._end(root, pair, "restore")
+        self._changed(root).watched = {}
 
     def restore(self, root: Context, state: Mapping[str, Any]) -> None:
         """Return to a saved state; all links have been cleared, and all else is restored."""
@@ -359,7 +364,8 @@ class ContactLinks(LeafSystem):
         memory.watched = {pair_of(n): (w["pose"], int(w["since"])) for n, w in watched.items()}
         memory.returns = {pair_of(name): int(count) for name, count in returns.items()}
         memory.mating = frozenset(frozenset(str(pair).split("|")) for pair in state["mating"])
-        memory.steps, memory.linked, memory.made = map(int, state["counts"])
+        memory.steps, memory.made = map(int, state["counts"])
+        memory.time, memory.linked = map(float, state["times"])
         memory.ended = Counter({n: int(count) for n, count in state.get("ended", {}).items()})
         for name, arrays in state.get("links", {}).items():
             pair = pair_of(name)

@@ -7,7 +7,7 @@ from rich.console import Console
 from cell.errors import InputError
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
-from experiments.assembly.prepare import running_cell
+from experiments.assembly.prepare import RunningCell
 from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.replay import Replay
 from experiments.assembly.results import write_infeasible, write_results
@@ -40,10 +40,10 @@ def run_job(job: Job) -> int:
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:
         console.print(f"Watch at {replay.url}", soft_wrap=True)
-    run = Run(*running_cell(job.product, job.config, job.seed, replay))
+    run = Run(RunningCell(job.product, job.config, job.seed, replay))
     if start is not None:
         todo = go_on(run, todo, start)
-    pictures = Pictures(run.simulation)
+    pictures = Pictures(run.running)
     with Progress(console, [step.name for step in todo]) as progress:
         run.watchers = (progress, pictures)
         run.run(todo)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from cell.simulation.simulation import Simulation
+from experiments.assembly.prepare import RunningCell
 from experiments.assembly.run import StepResult
 from experiments.reporting.html_page import Picture
 from experiments.reporting.render import CELL_VIEW, JIG_VIEW, rendering_problem, take_picture
@@ -18,8 +18,8 @@ class Pictures:
         problem: Why there are none, or None.
     """
 
-    def __init__(self, simulation: Simulation) -> None:
-        self.simulation = simulation
+    def __init__(self, running: RunningCell) -> None:
+        self.running = running
         self.problem = rendering_problem()
         self.taken: list[Picture] = []
 
@@ -29,7 +29,8 @@ class Pictures:
     def step(self, step: StepResult) -> None:
         """Take one picture per view."""
         if self.problem is None:
-            root, graph = self.simulation.root, self.simulation.cell.scene_graph
+            simulation = self.running.simulation
+            root, graph = simulation.root, simulation.cell.scene_graph
             self.taken += [
                 (f"{step.name} ({name})", take_picture(graph, root, view))
                 for name, view in VIEWS.items()

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from pydrake.systems.framework import DiagramBuilder
@@ -11,7 +11,9 @@ from cell.builder import add_cell
 from cell.configuration.config import CellConfig
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
+from cell.simulation.state import hand_over
 from experiments.assembly.replay import Replay
+from planning.operations.operation import Operation
 from planning.operations.station import Station
 from planning.perception.belief import TruthSource
 
@@ -50,28 +52,69 @@ class Disturbance:
         return replace(config, workcell=tray)
 
 
-def running_cell(
-    product: Product, config: CellConfig, seed: int, replay: Replay | None = None
-) -> tuple[Simulation, Station, Disturbance]:
-    """Build the disturbed cell, and the planner's undisturbed view of it.
+@dataclass
+class RunningCell:
+    """A cell that runs, and the planner's view of it, at the time step that an operation allows.
 
-    Args:
+    Drake's plant has one time step for good: for each there is a cell of its own, built when it is
+    first needed, to which the state is handed over.
+
+    Attributes:
         product: What is assembled.
         config: Every number of the cell, as the planner believes it to be.
         seed: Seeds disturbance, sensor noise and sampling planners.
-        replay: Where to show it, if at all.
-
-    Returns:
-        The running cell, the planner's view, and the disturbance between them.
+        replay: Where it is shown; None: nowhere.
+        disturbance: How far the cell is from what the planner takes it for.
+        simulation: That runs at present.
+        station: The planner's view of it.
     """
-    builder = DiagramBuilder()
-    disturbance = Disturbance.draw(config, seed)
-    cell = add_cell(builder, disturbance.applied_to(config), product)
-    if replay is not None:
-        replay.add_to(builder, cell)
-    simulation = Simulation(cell.with_diagram(builder.Build()))
-    if replay is not None:
-        replay.follow(simulation.root)
-    source = TruthSource.of(simulation.cell, simulation.root, seed)
-    station = Station(simulation.cell, simulation.root, source, seed, nominal=config)
-    return simulation, station, disturbance
+
+    product: Product
+    config: CellConfig
+    seed: int
+    replay: Replay | None = None
+    disturbance: Disturbance = field(init=False)
+    simulation: Simulation = field(init=False)
+    station: Station = field(init=False)
+    _built: dict[float, tuple[Simulation, Station]] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.disturbance = Disturbance.draw(self.config, self.seed)
+        self._switch(self.config.simulation.time_step)
+
+    def switch(self, operation: Operation) -> None:
+        """Let the present simulation be that at the time step of an operation, as it was left."""
+        steps = self.config.simulation
+        self._switch(steps.coarse_time_step if operation.coarse else steps.time_step)
+
+    def go_on(self, operation: Operation | None = None) -> None:
+        """Go on at the time step of an operation; with none given, at the configured one."""
+        simulation, station = self.simulation, self.station
+        if operation is None:
+            self._switch(self.config.simulation.time_step)
+        else:
+            self.switch(operation)
+        if self.simulation is not simulation:
+            hand_over(simulation, self.simulation)
+            self.station.restore(station.save())
+
+    def _switch(self, time_step: float) -> None:
+        if time_step not in self._built:
+            self._built[time_step] = self._build(time_step)
+        self.simulation, self.station = self._built[time_step]
+
+    def _build(self, time_step: float) -> tuple[Simulation, Station]:
+        """Build the disturbed cell, and the planner's undisturbed view of it."""
+        config = replace(
+            self.config, simulation=replace(self.config.simulation, time_step=time_step)
+        )
+        builder = DiagramBuilder()
+        cell = add_cell(builder, self.disturbance.applied_to(config), self.product)
+        if self.replay is not None:
+            self.replay.add_to(builder, cell)
+        simulation = Simulation(cell.with_diagram(builder.Build()))
+        if self.replay is not None:
+            self.replay.follow(simulation)
+        source = TruthSource.of(simulation.cell, simulation.root, self.seed)
+        station = Station(simulation.cell, simulation.root, source, self.seed, nominal=config)
+        return simulation, station

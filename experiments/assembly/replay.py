@@ -26,6 +26,8 @@ from cell.errors import UnknownName
 from cell.fixtures.soft_jig import SoftJig
 from cell.fixtures.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
 from cell.fixtures.soft_jig.visual import membrane_shape
+from cell.monitor import join_monitors
+from cell.simulation.simulation import Simulation
 from experiments.reporting.output import write_text
 
 FRAME_PERIOD = 0.05  # Between two pictures [s] [A].
@@ -74,6 +76,30 @@ class MembraneFilm(LeafSystem):
         self.count += 1
 
 
+class Mirror:
+    """A monitor that lets a simulation that is drawn look like the one that runs.
+
+    Args:
+        running: Not connected to a visualizer.
+        drawn: The same bodies, in a diagram with one.
+    """
+
+    def __init__(self, running: Simulation, drawn: Simulation) -> None:
+        self.running, self.drawn, self.shown = running, drawn, -np.inf
+
+    def __call__(self, root: Context) -> None:
+        """Show the bodies, if a picture is due."""
+        time = root.get_time()
+        if time - self.shown < FRAME_PERIOD - 1e-6:
+            return
+        self.shown, drawn = time, self.drawn
+        drawn.root.SetTime(time)
+        q = self.running.cell.plant.GetPositions(self.running.context)
+        drawn.cell.plant.SetPositions(drawn.context, q)
+        assert drawn.cell.diagram is not None
+        drawn.cell.diagram.ForcedPublish(drawn.root)
+
+
 class Replay:
     """Meshcat for one run; does nothing when neither a view nor a file is wanted.
 
@@ -87,6 +113,7 @@ class Replay:
         logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat reports its port.
         self.meshcat = Meshcat(MeshcatParams(show_stats_plot=False)) if view or file else None
         self.film: MembraneFilm | None = None
+        self._drawn: Simulation | None = None
 
     @property
     def url(self) -> str | None:
@@ -94,8 +121,8 @@ class Replay:
         return self.meshcat.web_url() if self.view and self.meshcat else None
 
     def add_to(self, builder: DiagramBuilder, cell: Cell) -> None:
-        """Connect to a diagram under construction."""
-        if self.meshcat is None:
+        """Connect to a diagram under construction, if it is the first one."""
+        if self.meshcat is None or self._drawn is not None:
             return
         params = MeshcatVisualizerParams(publish_period=FRAME_PERIOD)
         MeshcatVisualizer.AddToBuilder(builder, cell.scene_graph, self.meshcat, params)
@@ -109,10 +136,20 @@ class Replay:
                 frames_per_second=1.0 / FRAME_PERIOD, set_visualizations_while_recording=self.view
             )
 
-    def follow(self, root: Context) -> None:
-        """Show the jig as it is in a Context of the built diagram."""
-        if self.film is not None:
-            self.film.root = root
+    def follow(self, simulation: Simulation) -> None:
+        """Show a simulation of the built diagram, or how the same bodies move in another one.
+
+        The membrane is that of the first: it does not change while another one runs.
+        """
+        if self.meshcat is None:
+            return
+        if self._drawn is None:
+            self._drawn = simulation
+            if self.film is not None:
+                self.film.root = simulation.root
+        else:
+            mirror = Mirror(simulation, self._drawn)
+            simulation.simulator.set_monitor(join_monitors(simulation.cell.monitor, mirror))
 
     def save(self) -> None:
         """Write the recording, if one is wanted."""

@@ -85,7 +85,7 @@ def _result(job: Job, fixing: FixingPlan, run: Run) -> dict[str, Any]:
         "steps": [_step(step) for step in run.steps],
         "real_time_factor": (simulation.time - began) / max(simulation.stepping_cpu, 1e-9),
         "sim_seconds": simulation.time - began,
-        "disturbance": asdict(run.disturbance),
+        "disturbance": asdict(run.running.disturbance),
         "contact_links": simulation.cell.links.summary(simulation.root),
     }
     if run.failure is not None:

@@ -14,7 +14,7 @@ from cell.errors import InputError, RunFailure
 from cell.simulation.phase import Outcome, Phase, PhaseFailed
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
-from experiments.assembly.prepare import Disturbance
+from experiments.assembly.prepare import RunningCell
 from planning.operations.limits import FailedCheck
 from planning.operations.measures import measure
 from planning.operations.operation import PhaseRecord, Role, Step, StepRecord
@@ -76,9 +76,7 @@ class Run:
     """A run of steps on one simulation.
 
     Attributes:
-        simulation: The running cell.
-        station: The planner's view of it.
-        disturbance: How far the cell is from what the planner takes it for.
+        running: The cell.
         watchers: Told of each phase before it starts and of each step when it is done.
         records: What was recorded of each step, in the same order as ``steps``.
         steps: Results so far.
@@ -86,9 +84,7 @@ class Run:
         done: Names of the steps before this run.
     """
 
-    simulation: Simulation
-    station: Station
-    disturbance: Disturbance
+    running: RunningCell
     watchers: tuple[Watcher, ...] = ()
     records: list[StepRecord] = field(default_factory=list)
     steps: list[StepResult] = field(default_factory=list)
@@ -96,6 +92,16 @@ class Run:
     done: tuple[str, ...] = ()
     _phase: str = ""
     _start: State = field(default_factory=dict)
+
+    @property
+    def simulation(self) -> Simulation:
+        """That runs at present."""
+        return self.running.simulation
+
+    @property
+    def station(self) -> Station:
+        """The planner's view of it."""
+        return self.running.station
 
     @property
     def verdict(self) -> str:
@@ -115,11 +121,14 @@ class Run:
                 watcher.step(result)
             if self.failure is not None:
                 return
+        self.running.go_on()
 
     def _step(self, step: Step) -> StepResult:
-        simulation, station, started = self.simulation, self.station, time.process_time()
+        started = time.process_time()
         record = self._record(step)
         self.records.append(record)
+        self.running.go_on(step.operation)
+        simulation, station = self.simulation, self.station
         try:
             simulation.run(self._watched(record))
         except PhaseFailed as error:

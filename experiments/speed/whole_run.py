@@ -20,6 +20,7 @@ from cell.machines.gripper import Gripper
 from cell.simulation.phase import Outcome, Phase, Sensed
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
+from experiments.assembly.prepare import RunningCell
 from experiments.reporting.output import write_arrays, write_json
 from experiments.speed.phase_class import PhaseClass, class_of
 from planning.operations.operation import Step
@@ -85,20 +86,16 @@ def state_file(folder: Path, number: int) -> Path:
 
 def make_whole_run(
     folder: Path,
-    simulation: Simulation,
-    station: Station,
+    running: RunningCell,
     steps: Sequence[Step],
-    seed: int,
     watch: Callable[[PhaseRun], None],
 ) -> WholeRun:
     """Run all steps from the beginning; keep the state at the start of each phase.
 
     Args:
         folder: Existing; earlier states in it are replaced.
-        simulation: Fresh.
-        station: The planner's view of it.
+        running: Fresh.
         steps: Of the plan.
-        seed: With which simulation and station were made.
         watch: Told of each phase when it is done.
 
     Raises:
@@ -107,6 +104,8 @@ def make_whole_run(
     (folder / INDEX).unlink(missing_ok=True)
     done: list[PhaseRun] = []
     for number, step in enumerate(steps):
+        running.go_on(step.operation)
+        simulation, station = running.simulation, running.station
         # A step is begun again with what the planner knew before it.
         known = station.save()
         phases = _started(step, station)
@@ -120,9 +119,9 @@ def make_whole_run(
             planned = time.process_time()
             kind, before = class_of(phase, station.in_hand), simulation.steps
             write_arrays(state_file(folder, len(done)), save_state(simulation) | known)
-            running = time.process_time()
+            begun = time.process_time()
             outcome = simulation.run_phase(phase)
-            cpu = time.process_time() - running
+            cpu = time.process_time() - begun
             run = PhaseRun(
                 number=len(done),
                 step=number,
@@ -137,12 +136,12 @@ def make_whole_run(
             done.append(run)
             watch(run)
     rows = [asdict(run) | {"phase_class": run.phase_class.value} for run in done]
-    write_json(folder / INDEX, {"seed": seed, "phases": rows})
-    return WholeRun(folder, seed, tuple(done))
+    write_json(folder / INDEX, {"seed": running.seed, "phases": rows})
+    return WholeRun(folder, running.seed, tuple(done))
 
 
-def read_whole_run(folder: Path, simulation: Simulation, seed: int) -> WholeRun:
-    """Return the run whose states are in a folder.
+def read_whole_run(folder: Path, running: RunningCell) -> WholeRun:
+    """Return the run of a cell whose states are in a folder.
 
     Raises:
         Outdated: There is none, or it is of another cell or seed than this one.
@@ -158,9 +157,11 @@ def read_whole_run(folder: Path, simulation: Simulation, seed: int) -> WholeRun:
         raise Outdated(f"There are no start states in '{folder}'.") from None
     except (OSError, ValueError, KeyError, TypeError) as error:
         raise Outdated(f"The start states in '{folder}' cannot be read: {error}.") from error
-    if run.seed != seed:
-        raise Outdated(f"The start states in '{folder}' are of seed {run.seed}, not {seed}.")
-    put_at_start(simulation, run, 0)
+    if run.seed != running.seed:
+        raise Outdated(
+            f"The start states in '{folder}' are of seed {run.seed}, not {running.seed}."
+        )
+    put_at_start(running.simulation, run, 0)
     return run
 
 
@@ -177,7 +178,7 @@ def put_at_start(simulation: Simulation, run: WholeRun, number: int) -> None:
 
 
 def resumed(
-    run: WholeRun, simulation: Simulation, station: Station, step: Step, wanted: Sequence[PhaseRun]
+    run: WholeRun, running: RunningCell, step: Step, wanted: Sequence[PhaseRun]
 ) -> Generator[tuple[PhaseRun, Phase], None, None]:
     """Yield wanted phases of one step again, in their order, with the simulation at their start.
 
@@ -187,14 +188,15 @@ def resumed(
 
     Args:
         run: The whole run.
-        simulation: Of the same cell; it may be left in any state.
-        station: The planner's view of it.
+        running: Of the same cell; it may be left in any state.
         step: Which step; of the same plan.
         wanted: Phases of that step, one at least.
 
     Raises:
         Outdated: The states do not fit the cell or its operations any more.
     """
+    running.switch(step.operation)
+    simulation, station = running.simulation, running.station
     first = next(phase.number for phase in run.phases if phase.step == wanted[0].step)
     station.restore(run.state(first))
     phases = _started(step, station)

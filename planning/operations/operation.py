@@ -178,6 +178,8 @@ class Operation:
         plots: Returns what is worth drawing of a recorded step, given the cell and the whole log.
         role: What it does for an assembly; None: it has no place in one.
         joint: The kind of joint that it makes or helps to make; None: none.
+        coarse: Whether it may take `simulation.coarse_factor` times the time step: nothing in it
+            depends on the step but what links carry (docs/physics/time_step.md).
         plan: Returns the step that the operation can take in a scene, with these parts (of
             `Role.FINISH`: with none given) and with riders on them; None where it is not meant for
             them. Raises `NoOperation` where it is meant for them and something is missing.
@@ -190,4 +192,5 @@ class Operation:
     plots: Callable[[Cell, StepRecord, Arrays], list[Plot]] = no_plots
     role: Role | None = None
     joint: type[Joint] | None = None
+    coarse: bool = False
     plan: Callable[[Scene, tuple[str, ...], tuple[str, ...]], Step | None] = plans_nothing

@@ -24,5 +24,6 @@ INSERT_SHAFT = Operation(
     plots=plots,
     role=Role.BRING,
     joint=Fit,
+    coarse=True,
     plan=plan,
 )

@@ -51,6 +51,7 @@ PLACE_BOLTS = Operation(
     limits=LIMITS,
     role=Role.BRING,
     joint=Screw,
+    coarse=True,
     plan=plan,
 )
 PLACE_LOOSE_BOLTS = Operation(
@@ -60,5 +61,6 @@ PLACE_LOOSE_BOLTS = Operation(
     limits=LOOSE_LIMITS,
     role=Role.BRING,
     joint=Screw,
+    coarse=True,
     plan=plan_loose,
 )
