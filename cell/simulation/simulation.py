@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
@@ -143,9 +145,34 @@ class Simulation:
                 raise PhaseFailed(phase.name, reason)
             if phase.until(sensed):
                 run.finish()
-                return Outcome(sensed, run.peak_force)
+                kept = replace(sensed, grippers=dict(sensed.grippers), drivers=dict(sensed.drivers))
+                return Outcome(kept, run.peak_force)
             if sensed.time > phase.timeout:
                 raise PhaseFailed(phase.name, f"end condition not met in {phase.timeout:g} s")
+
+
+class WhenRead[Reading](Mapping[str, Reading]):
+    """Readings of sensors, computed when they are read: once, and before the next step.
+
+    Args:
+        read: Returns the reading of a device.
+        names: Of the devices.
+    """
+
+    def __init__(self, read: Callable[[str], Reading], names: Iterable[str]) -> None:
+        self._read, self._names = read, tuple(names)
+        self._known: dict[str, Reading] = {}
+
+    def __getitem__(self, name: str) -> Reading:
+        if name not in self._known:
+            self._known[name] = self._read(name)
+        return self._known[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._names)
+
+    def __len__(self) -> int:
+        return len(self._names)
 
 
 class _PhaseRun:
@@ -160,6 +187,9 @@ class _PhaseRun:
         self.log_every = max(1, round(period / simulation.time_step))
         self.last: Sensed | None = None
         self.tools = {arm.tool.name: arm.tool for arm in self.cell.arms.values()}
+        tools = self.tools.items()
+        self.grippers = {name: tool for name, tool in tools if isinstance(tool, Gripper)}
+        self.drivers = {name: tool for name, tool in tools if isinstance(tool, Driver)}
         self.arm_commands: dict[str, ArmCommand] = {}
         if phase.tare:
             simulation.tare = dict(simulation.wrists)
@@ -210,16 +240,15 @@ class _PhaseRun:
         simulation.wrists = simulation.read_wrists()
         wrench = {name: now - simulation.tare[name] for name, now in simulation.wrists.items()}
         for name, value in wrench.items():
-            self.peak_force[name] = max(self.peak_force[name], float(np.linalg.norm(value[3:])))
-        tools = self.tools.items()
+            self.peak_force[name] = max(self.peak_force[name], math.hypot(*value[3:]))
         now = self.step * simulation.time_step
         motions = [c for c in self.arm_commands.values() if not isinstance(c, Follow | Impedance)]
         self.last = Sensed(
             time=now,
             step=self.step,
             wrench=wrench,
-            grippers={n: tool.read(context) for n, tool in tools if isinstance(tool, Gripper)},
-            drivers={n: tool.read(context) for n, tool in tools if isinstance(tool, Driver)},
+            grippers=WhenRead(lambda name: self.grippers[name].read(context), self.grippers),
+            drivers=WhenRead(lambda name: self.drivers[name].read(context), self.drivers),
             finished=all(now >= motion.duration for motion in motions),
             X_WF=lambda frame: frame.CalcPoseInWorld(context),
         )
