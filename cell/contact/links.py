@@ -214,8 +214,7 @@ class ContactLinks(LeafSystem):
         memory.steps += 1
         memory.linked += len(memory.installed)
         self._end_unwanted(root)
-        if memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0:
-            self._check(root)
+        self._check(root, due=memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0)
         if memory.steps % max(1, round(LOOK_PERIOD / dt)) == 0:
             self._look(root, dt)
 
@@ -225,11 +224,13 @@ class ContactLinks(LeafSystem):
             if self.policy.until(root, *self._side.bodies(pair), memory.mating) != own.until:
                 self._end(root, pair, "command")
 
-    def _check(self, root: Context) -> None:
+    def _check(self, root: Context, *, due: bool) -> None:
+        """Check all links if that is due, else those that have been jolted."""
         context, memory = self._plant.GetMyContextFromRoot(root), self.memory(root)
-        for pair in list(memory.installed):
-            own = memory.installed[pair]
-            if own.sleepers or self._ended_by_check(root, pair):
+        for pair, own in list(memory.installed.items()):
+            if own.sleepers or not (due or own.link.jolted(*self._side.poses(context, pair))):
+                continue
+            if self._ended_by_check(root, pair) or not due:
                 continue
             if own.link.relax(*self._side.poses(context, pair)):
                 self._side.set_springs(root, pair, own.slots, own.link)

@@ -18,6 +18,7 @@ six forces are the wrench that the contact carries at the moment: nothing jumps.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -76,7 +77,7 @@ class Springs:
         forces = np.linalg.solve(unit.T * scale[:, None], about_centre * scale)
         return Springs(points, directions, stiffness, forces)
 
-    @property
+    @cached_property
     def lines(self) -> Array:
         """Wrenches (6, 6) of unit forces of the springs on A, about the origin of W."""
         return line_wrenches(self.points, self.directions)
