@@ -217,6 +217,19 @@ def test_link_yields_at_the_load_at_which_full_contact_does() -> None:
     assert ended(block) == ["yield"]
 
 
+@pytest.mark.parametrize("delay", range(5))
+@pytest.mark.parametrize("blow", [(40.0, 0.0, 0.0), (0.0, 0.0, 80.0)], ids=["aside", "up"])
+def test_blow_ends_a_link_within_two_steps(blow: tuple[float, ...], delay: int) -> None:
+    """Wherever it falls in the period of the checks: springs must not pass it on."""
+    block = Block(linked=True)
+    for _ in range(delay):
+        block.step(np.zeros(3))
+    assert block.linked
+    for _ in range(2):
+        block.step(np.array(blow))
+    assert not block.linked
+
+
 def test_full_contact_is_back_after_a_slip() -> None:
     """What slides on is braked by friction, not held by springs."""
     block = Block(linked=True)

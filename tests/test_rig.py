@@ -6,6 +6,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
+from pydrake.multibody.math import SpatialVelocity
 
 from cell import CellConfig, load_product
 from cell.errors import BadPart, UnknownName
@@ -14,8 +15,10 @@ from cell.simulation.phase import PhaseFailed
 from experiments.paper.cases import Case, case_seed, judged, wilson
 from experiments.paper.postures import AXES, POSTURES, PUSHES, chosen
 from experiments.paper.push_rule import push_line
+from experiments.paper.rest import Rest
 from experiments.paper.rig.rig import HandPose, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation, smooth_path, stroke_path
+from experiments.paper.rig.stage import Observer
 from experiments.paper.rig_hand import RigBench, tip_pose
 from experiments.paper.trial import TrialDisturbance, check_fits, planned_pose, run_trial
 from experiments.paper.trial_metrics import tilt_between
@@ -101,6 +104,29 @@ def test_motor_falls_over_on_a_rigid_plate(motor_rig) -> None:
     assert not result.success
     # The press acts on the force plate under the jig: the limit of the hand is 20 N.
     assert 15 < result.measured["place_normal_peak_N"] < 40
+
+
+@pytest.mark.parametrize(
+    ("speeds", "rests"),
+    [
+        (np.full(100, 5e-5), True),
+        (np.full(99, 5e-5), False),
+        (np.full(100, 2e-4), False),
+        (1e-6 * np.exp(np.arange(100) / 70), False),
+    ],
+    ids=["still", "not for long", "moving", "about to fall over"],
+)
+@pytest.mark.parametrize("body", ["part", "jig_base"])
+def test_rest_is_to_be_slow_for_a_while_without_getting_faster(
+    motor_rig, body: str, speeds: np.ndarray, rests: bool
+) -> None:
+    observer = Observer(motor_rig, motor_rig.diagram.CreateDefaultContext())
+    rest, moving, found = Rest(observer), getattr(motor_rig, body).body, False
+    for speed in speeds:
+        velocity = SpatialVelocity(np.zeros(3), np.array([0.0, speed, 0.0]))
+        motor_rig.plant.SetFreeBodySpatialVelocity(observer.context, moving, velocity)
+        found = rest.reached()
+    assert found == rests
 
 
 def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:

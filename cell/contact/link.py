@@ -34,10 +34,13 @@ TOLERANCE = 0.01
 # Polygons are the same ones while bodies move by less [m]: a fifth of the clearance of a tight fit,
 # and of the depth of a frozen bed's contact [A].
 FAR = 5e-5
+# A contact would stick with this share to spare when it is linked.
+SPARE = 5 * TOLERANCE
 # A contact is not checked again before its force has changed by this share of the normal one [A].
 NEGLIGIBLE = 0.003
 # Tries to find friction that balances the load; a patch near its limit takes most [A].
 REDISTRIBUTIONS = 12
+SPRING_FIELDS = tuple(Springs.__dataclass_fields__)
 
 
 @dataclass
@@ -105,12 +108,20 @@ class Link:
 
     def admissible(self) -> bool:
         """Return whether the contact sticks as it is, with something to spare."""
-        share = 1.0 - 5 * TOLERANCE
-        return self._overload(np.zeros_like(self.tangential), share) is None
+        return self._overload(np.zeros_like(self.tangential), 1.0 - SPARE) is None
 
     def wrench(self, X_WA: RigidTransform, X_WB: RigidTransform) -> Array:
         """Return the wrench (6,) that A feels at poses of the bodies, about Wo."""
         return self.springs.lines.T @ self._forces(self.displacement(X_WA, X_WB))
+
+    def jolted(self, displacement: Array) -> bool:
+        """Return whether the load has changed so much since the latest check as to need another.
+
+        A blow takes a contact from rest beyond its limits within a few steps, and springs that go
+        on for longer pass all of it on: what they hold together is struck harder than it would be.
+        """
+        change = np.abs(self._forces(displacement) - self.checked).sum()
+        return bool(change > SPARE * self.normal_force)
 
     def violation(self, displacement: Array) -> str | None:
         """Return why full contact has to come back at a `displacement`: None if it has not."""
@@ -230,7 +241,7 @@ class Link:
         return {
             "X_WA": self.X_WA.GetAsMatrix34(),
             "X_WB": self.X_WB.GetAsMatrix34(),
-            "springs": {name: getattr(self.springs, name) for name in Springs.__dataclass_fields__},
+            "springs": {name: getattr(self.springs, name) for name in SPRING_FIELDS},
             "softening": np.array(self.softening),
             "preload": self.preload,
             "polygons": dict(vars(self.polygons)),

@@ -227,8 +227,7 @@ class ContactLinks(LeafSystem):
         memory.time += dt
         memory.linked += dt * len(memory.installed)
         self._end_unwanted(root)
-        if memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0:
-            self._check(root)
+        self._check(root, due=memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0)
         if memory.steps % max(1, round(LOOK_PERIOD / dt)) == 0:
             self._look(root, dt)
 
@@ -238,16 +237,19 @@ class ContactLinks(LeafSystem):
             if self.policy.until(root, pair, memory.mating) != own.until:
                 self._end(root, pair, "command")
 
-    def _check(self, root: Context) -> None:
+    def _check(self, root: Context, *, due: bool) -> None:
+        """Check all links if that is due, else those that have been jolted."""
         context, memory = self._plant.GetMyContextFromRoot(root), self.memory(root)
         for pair, own in list(memory.installed.items()):
             if own.sleepers:
                 continue
             displacement = own.link.displacement(*self._side.poses(context, pair))
+            if not due and not own.link.jolted(displacement):
+                continue
             reason = own.link.violation(displacement)
             if reason is not None:
                 self._return(root, pair, reason)
-            elif own.link.relax(displacement):
+            elif due and own.link.relax(displacement):
                 self._side.set_springs(root, pair, own.slots, own.link)
 
     def _return(self, root: Context, pair: Pair, reason: str) -> None:

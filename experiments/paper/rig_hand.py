@@ -11,6 +11,7 @@ from cell.configuration.config import CellConfig
 from cell.products.product import Grasp, Product
 from cell.simulation.phase import PhaseFailed
 from experiments.paper.postures import Posture
+from experiments.paper.rest import Rest
 from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation
 from experiments.paper.rig.stage import Observer
@@ -152,3 +153,12 @@ class RigHand:
         """Hold the hand still."""
         self.simulation.begin(phase)
         self.simulation.wait(seconds)
+
+    def wait_for_rest(self, phase: str, longest: float) -> None:
+        """Hold the hand still until part and jig rest."""
+        simulation, rest = self.simulation, Rest(self.observer)
+        simulation.begin(phase)
+        for _ in range(round(longest / simulation.time_step)):
+            simulation.step()
+            if rest.reached():
+                break

@@ -18,13 +18,13 @@ from pydrake.math import RigidTransform
 from cell.builder import Cell, build_cell
 from cell.configuration.config import CellConfig
 from cell.errors import CellError, RunFailure
-from cell.fixtures.soft_jig import SurfaceSamples
 from cell.products.product import Grasp, Product
 from cell.simulation.events import rest_jig, wake_jig
-from cell.simulation.phase import Outcome, Phase, PhaseFailed, Running, after
+from cell.simulation.phase import Condition, Outcome, Phase, PhaseFailed, Running, after
 from cell.simulation.simulation import Simulation
 from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
+from experiments.paper.rest import Rest
 from experiments.paper.rig.stage import Observer, Stage
 from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
 from experiments.speed.meter import Meter
@@ -139,7 +139,6 @@ def _stage(cell: Cell, part: str) -> Stage:
         jig_base=cell.jig_base,
         fixture=cell.fixture,
         part=cell.parts[part],
-        surface=SurfaceSamples.of(part, cell.product.parts[part].mesh).points,
         gripper=cell.gripper,
         wrist=cell.holder.wrist,
         force_plate=cell.force_plate,
@@ -193,9 +192,17 @@ class RobotHand:
 
     def wait(self, phase: str, seconds: float) -> None:
         """Hold still."""
+        self._hold(phase, after(seconds), seconds)
+
+    def wait_for_rest(self, phase: str, longest: float) -> None:
+        """Hold still until part and jig rest."""
+        rest, over = Rest(self.observer), after(longest)
+        self._hold(phase, lambda sensed: rest.reached() or over(sensed), longest)
+
+    def _hold(self, phase: str, until: Condition, longest: float) -> None:
         awake = frozenset(self.station.fixed)
-        kind, limit = TrialPhase(phase), seconds + 1.0
-        self._run(Phase(kind, after(seconds), limit, start=(wake_jig,), awake=awake))
+        kind, limit = TrialPhase(phase), longest + 1.0
+        self._run(Phase(kind, until, limit, start=(wake_jig,), awake=awake))
 
     def _place(self, last: Enum) -> None:
         """Go on with placing the part, until a phase has ended; recorded from the press on."""

@@ -24,7 +24,7 @@ from planning.operations.push.phases import PushLine
 HOVER = 0.001  # Clearance of the part over the bag at the reference pose for the depth [m] [A].
 REST_TIME = 0.3  # From the retreat of the hand to its approach for a push [s] [A].
 READY_TIME = 0.1  # With everything awake, before the first contact [s] [A].
-COAST_TIME = 0.6  # From the stop of the hand until everything is at rest again [s] [A].
+COAST_TIME = 0.6  # From the stop of the hand until everything is at rest again, at most [s] [A].
 
 
 @dataclass(frozen=True)
@@ -115,6 +115,10 @@ class Hand(Protocol):
 
     def wait(self, phase: str, seconds: float) -> None:
         """Hold still, in a phase of its own."""
+        ...
+
+    def wait_for_rest(self, phase: str, longest: float) -> None:
+        """Hold still until part and jig rest or a time has passed [s], in a phase of its own."""
         ...
 
 
@@ -211,7 +215,10 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
         hand.press()
         trial.planned, trial.held = hand.planned, observer.X_JP
         hand.let_go()
-        hand.wait("settle", SETTLE_TIME if push is None else REST_TIME)
+        if push is None:
+            hand.wait_for_rest("settle", SETTLE_TIME)
+        else:
+            hand.wait("settle", REST_TIME)
         trial.placed, trial.speed = observer.X_JP, observer.speed
         watch("placed", observer)
         if push is not None:
@@ -237,6 +244,6 @@ def _push(hand: Hand, push: PushSpec, trial: TrialRecord, watch: Watch) -> None:
     trial.before = observer.X_WJ
     watch("before", observer)
     hand.push(line)
-    hand.wait("coast", COAST_TIME)
+    hand.wait_for_rest("coast", COAST_TIME)
     trial.after = observer.X_WJ
     watch("after", observer)

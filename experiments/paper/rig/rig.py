@@ -26,7 +26,6 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 from cell.builder import plant_config
 from cell.configuration.config import CellConfig
 from cell.fixtures import add_fixture
-from cell.fixtures.soft_jig import SurfaceSamples
 from cell.fixtures.wiring import wire_fixture
 from cell.link_policy import add_links
 from cell.machines.drive import JointDrive
@@ -183,7 +182,6 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
         jig_base=jig_base,
         fixture=fixture,
         part=loose,
-        surface=SurfaceSamples.of(part, loose.part.mesh).points,
         drive=drive,
         carriage=carriage,
         gripper=gripper,

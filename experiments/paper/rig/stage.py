@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from pydrake.geometry import SceneGraph
@@ -12,6 +13,7 @@ from pydrake.systems.framework import Context
 
 from cell.configuration.config import CellConfig
 from cell.fixtures.base import Fixture
+from cell.fixtures.soft_jig import SurfaceSamples
 from cell.machines.gripper import Gripper
 from cell.machines.jig_base import JigBase
 from cell.machines.sensors import WrenchSensor
@@ -34,7 +36,6 @@ class Stage:
         jig_base: The base, free on the force plate.
         fixture: On the base.
         part: The part to place.
-        surface: (n, 3) points of its surface, in its frame [m].
         gripper: The jaws; the frame "tip" of the model is T, between the tip pads.
         wrist: Wrench between the hand and its carrier.
         force_plate: Wrench under the force plate.
@@ -46,10 +47,14 @@ class Stage:
     jig_base: JigBase
     fixture: Fixture
     part: LoosePart
-    surface: np.ndarray
     gripper: Gripper
     wrist: WrenchSensor
     force_plate: WrenchSensor
+
+    @cached_property
+    def surface(self) -> np.ndarray:
+        """Points (n, 3) of the part's surface, in its frame [m]: only a push asks for them."""
+        return SurfaceSamples.of(self.part.part.name, self.part.part.mesh).points
 
 
 class Observer:
