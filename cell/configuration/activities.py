@@ -86,7 +86,7 @@ class MotionConfig:
     """Free motion of the arms."""
 
     velocity_scale: float = setting(
-        0.8, "", "Share of the joint speed limits.",
+        0.9, "", "Share of the joint speed limits.",
         "[A] The rest is for the feedback. Slip in the jaws grows with it [M].",
         above=0.0, at_most=1.0,
     )  # fmt: skip
@@ -96,13 +96,13 @@ class MotionConfig:
         above=0.0, at_most=100.0,
     )  # fmt: skip
     wrist_force: float = setting(
-        4.0, "N", "Largest force that accelerates tool and payload, along each axis of W.",
-        "[A] Together at most 7 N: less than the 10 N of insertions and thrusts.",
+        2.5, "N", "Largest force that accelerates tool and payload, along each axis of W.",
+        "[A] In all at most 4.3 N, less than half of what insertions and thrusts take.",
         above=0.0, at_most=1000.0,
     )  # fmt: skip
     ramp_time: float = setting(
         0.04, "s", "Time in which an acceleration of an arm rises or falls.",
-        "[A] As long as what swings in arm and drives takes to come to rest [M].",
+        "[M] What swings in arm and drives comes to rest within 0.03 s.",
         at_least=1e-3, at_most=1.0,
     )  # fmt: skip
     tool_speed: float = setting(

@@ -210,7 +210,8 @@ def _sampled(
     """Return the curve at regular times, given the distance s(t) travelled on it.
 
     The distance is averaged over the ramp time that has just passed: the way stays the same, and an
-    acceleration that would jump rises evenly over that time.
+    acceleration that would jump rises evenly over that time. Out of a corner of the way it may then
+    pass the limits by 3 %.
     """
     start, duration = progress.start_time(), progress.end_time() - progress.start_time()
     period = min(SAMPLE_PERIOD, ramp_time) / 5

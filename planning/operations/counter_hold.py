@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
@@ -20,9 +21,24 @@ from planning.operations.grasping import (
 from planning.operations.station import Station
 from planning.operations.waiting import at_rest
 
-# What another arm does while the holder moves, given that motion and the joint angles (n,) to which
-# the holder goes from its end.
-Meanwhile = Callable[[JointMotion, Sequence[np.ndarray]], Mapping[str, Command]]
+
+@dataclass(frozen=True)
+class Coming:
+    """What the holder is about to do, for whoever moves beside it.
+
+    Attributes:
+        motion: Its planned motion.
+        q_then: Joint angles (n,) to which it goes on straight, if it does.
+        jaws: Positions (2,) of the fingers from soon after the start [m].
+    """
+
+    motion: JointMotion
+    q_then: np.ndarray
+    jaws: np.ndarray
+
+
+# What another arm does while the holder moves.
+Meanwhile = Callable[[Coming], Mapping[str, Command]]
 
 
 class HoldPhase(Enum):
@@ -41,6 +57,7 @@ def hold(station: Station, part: str, meanwhile: Meanwhile) -> Generator[Phase, 
     arm, gripper = station.holder, station.cell.gripper
     reach = first(_from_the_side(station, part), part, station)
     motion = station.move(arm, reach.q_before, [(station.hand, part)])
+    jaw = opened(gripper.model, reach.grasp)
     yield Phase(
         HoldPhase.APPROACH,
         motion_finished,
@@ -48,8 +65,8 @@ def hold(station: Station, part: str, meanwhile: Meanwhile) -> Generator[Phase, 
         subject=part,
         commands={
             arm.name: motion,
-            gripper.name: opened(gripper.model, reach.grasp),
-            **meanwhile(motion, [reach.q_at]),
+            gripper.name: jaw,
+            **meanwhile(Coming(motion, reach.q_at, np.full(2, jaw.opening / 2))),
         },
     )
     line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw)
@@ -79,10 +96,11 @@ def park(station: Station, meanwhile: Meanwhile) -> Iterator[Phase]:
     """Yield the phase that takes the holder home, out of the driver's way."""
     arm = station.holder
     motion = station.move(arm, arm.home)
+    jaws = station.cell.plant.GetPositions(station.context, arm.tool_instance)
     yield Phase(
         HoldPhase.PARK,
         motion_finished,
         20.0,
         subject=f"{arm.name} arm",
-        commands={arm.name: motion, **meanwhile(motion, [])},
+        commands={arm.name: motion, **meanwhile(Coming(motion, arm.home, jaws))},
     )

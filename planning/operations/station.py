@@ -146,20 +146,23 @@ class Station:
         self,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
-        arms: Mapping[str, np.ndarray] | None = None,
+        elsewhere: Mapping[str, np.ndarray] | None = None,
     ) -> Surroundings:
         """Return everything as it is believed to be now, without parts that were never seen.
 
-        ``arms`` are joint angles (n,) of some arms, in place of those that they have now.
+        Args:
+            may_touch: Pairs that are not checked, see `Surroundings`.
+            clearance: Least distance to what is not a robot [m]; None: the configured one.
+            elsewhere: Joint positions (n,) of some arms by name, or of the hand, where they will
+                not be what they are now.
         """
+        context, elsewhere = self.context, elsewhere or {}
+        q_jaws = self.cell.plant.GetPositions(context, self.holder.tool_instance)
         X_HandW = self.tool_pose(self.holder, "tip").inverse()
         others = [name for name in self.belief.estimates if name not in self.in_hand]
         return Surroundings(
-            arms={arm.name: arm.positions(self.context) for arm in self.cell.arms.values()}
-            | dict(arms or {}),
-            tools={
-                self.hand: self.cell.plant.GetPositions(self.context, self.holder.tool_instance)
-            },
+            arms={n: elsewhere.get(n, a.positions(context)) for n, a in self.cell.arms.items()},
+            tools={self.hand: elsewhere.get(self.hand, q_jaws)},
             X_WP={name: self.pose_of(name) for name in others},
             X_HandP={name: X_HandW @ self.pose_of(name) for name in self.in_hand},
             may_touch=tuple(may_touch),
@@ -174,7 +177,7 @@ class Station:
         near: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
-        arms: Mapping[str, np.ndarray] | None = None,
+        elsewhere: Mapping[str, np.ndarray] | None = None,
     ) -> list[np.ndarray]:
         """Return the collision-free joint angles (n,) [rad] with a tool frame at a pose.
 
@@ -185,9 +188,9 @@ class Station:
             near: (n,) joint angles; the nearest solution comes first.
             may_touch: Pairs that are not checked, see `Surroundings`.
             clearance: Least distance to what is not a robot [m]; None: the configured one.
-            arms: Where other arms will be, see `surroundings`.
+            elsewhere: See `surroundings`.
         """
-        self.model.arrange(self.surroundings(may_touch, clearance, arms))
+        self.model.arrange(self.surroundings(may_touch, clearance, elsewhere))
         solutions = arm.configurations(self.context, frame, X_WF, near)
         return [q for q in solutions if arm.model.is_regular(q) and self.model.is_free(arm.name, q)]
 
@@ -216,6 +219,7 @@ class Station:
         q_goal: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
+        elsewhere: Mapping[str, np.ndarray] | None = None,
         beside: Mapping[str, JointMotion] | None = None,
     ) -> JointMotion:
         """Return a collision-free motion from where the arm is to ``q_goal`` (n,) [rad].
@@ -225,6 +229,7 @@ class Station:
             q_goal: Where to.
             may_touch: Pairs that are not checked, see `Surroundings`.
             clearance: Least distance to what is not a robot [m]; None: the configured one.
+            elsewhere: See `surroundings`.
             beside: Motions of other arms, by name, that start together with this one; the arm waits
                 at its start as long as it would come too close to them. None: all others stand.
 
@@ -233,7 +238,8 @@ class Station:
         """
         beside = beside or {}
         ends = {name: motion.q[-1] for name, motion in beside.items()}
-        self.model.arrange(self.surroundings(may_touch, clearance, ends))
+        elsewhere = {**(elsewhere or {}), **ends}
+        self.model.arrange(self.surroundings(may_touch, clearance, elsewhere))
         self._calls += 1
         path = plan_path(
             self.model,

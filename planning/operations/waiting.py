@@ -50,7 +50,7 @@ def steady_wrist(arm: str) -> Steady:
 def at_rest(arm: str) -> Condition:
     """Return the condition that an arm's motion has ended and it does not swing any more."""
     steady = steady_wrist(arm)
-    return lambda sensed: steady(sensed) and sensed.finished
+    return lambda sensed: sensed.finished and steady(sensed)
 
 
 def steady_jaws(gripper: str) -> Steady:

@@ -86,13 +86,12 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         guard=holding,
         awake=held,
     )
-    # The wrist is tared after the second stretch: there the hand stops softly.
-    for look_kind, kind, height, felt in (
-        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, ABOVE, None),
-        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, ENTRY, TOUCH_FORCE),
+    for look_kind, kind, height in (
+        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, ABOVE),
+        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, ENTRY),
     ):
         yield from look(station, look_kind, bolt, [bolt], awake=held, guard=holding)
-        line = station.line(arm, jaw, at(raised(X_WMouth, height)), felt=felt)
+        line = station.line(arm, jaw, at(raised(X_WMouth, height)))
         yield Phase(
             kind,
             motion_finished,

@@ -7,10 +7,9 @@ way.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from itertools import pairwise
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
@@ -29,7 +28,7 @@ from cell.simulation.phase import (
 from cell.workpieces.thread import BIT_SEAT
 from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
-from planning.operations.counter_hold import hold, park
+from planning.operations.counter_hold import Coming, hold, park
 from planning.operations.grasping import backed_off, let_go, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
@@ -145,8 +144,8 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     order = star_order(station, step.parts)
     yield from look(station, DrivePhase.LOOK, clamped)
 
-    def meanwhile(motion: JointMotion, later: Sequence[np.ndarray]) -> dict[str, Command]:
-        return _come_beside(station, order[0], motion, later)
+    def meanwhile(coming: Coming) -> dict[str, Command]:
+        return _come_beside(station, order[0], coming)
 
     if station.config.driver.counter_hold:
         grasp = yield from hold(station, clamped, meanwhile)
@@ -172,7 +171,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
 
     yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
     holding = _holding(station)
-    above = _above(station, bolt)[0]
+    above = _above(station, bolt)
     yield Phase(
         DrivePhase.DRIVER_ABOVE,
         motion_finished,
@@ -272,59 +271,51 @@ def _holding(station: Station) -> list[tuple[str, str]]:
     return [(station.hand, part) for part in station.fixed]
 
 
-def _above(station: Station, bolt: str, q_hand: np.ndarray | None = None) -> list[np.ndarray]:
-    """Return configurations (n,) over a bolt's head, nearest first; at least one.
-
-    The driver may be turned any way about its own axis.
+def _above(
+    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
+) -> np.ndarray:
+    """Return the nearest configuration (n,) over a bolt's head, turned any way about its axis.
 
     Args:
         station: The planner's view of the cell.
         bolt: Name of the bolt.
-        q_hand: Joint angles (n,) of the holder; None: where it is.
+        elsewhere: See `Station.surroundings`.
 
     Raises:
         Unreachable: There is none.
     """
-    driver, hand = station.driver, station.holder.name
+    driver, holding = station.driver, _holding(station)
     tip, near = driver.frame("tool_tip"), driver.positions(station.context)
     X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
-    arms = {} if q_hand is None else {hand: q_hand}
     found: list[np.ndarray] = []
     for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
         X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
-        found += station.configurations(
-            driver, tip, X, near, _holding(station), FINE_CLEARANCE, arms
-        )
+        found += station.configurations(driver, tip, X, near, holding, FINE_CLEARANCE, elsewhere)
     if not found:
         reason = "no turn of the driver keeps clear there"
         raise Unreachable(driver.name, tip.name(), X_WE, reason)
-    return sorted(found, key=lambda q: float(np.max(np.abs(q - near))))
+    return min(found, key=lambda q: float(np.max(np.abs(q - near))))
 
 
-def _come_beside(
-    station: Station, bolt: str, motion: JointMotion, later: Sequence[np.ndarray]
-) -> dict[str, Command]:
-    """Return the command that brings the driver over a bolt while the hand moves.
+def _come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:
+    """Return the command that brings the driver over a bolt while the hand comes, too.
 
-    Where the two would be in each other's way, the driver stays: it comes when the hand is there.
-
-    Args:
-        station: The planner's view of the cell.
-        bolt: Name of the bolt.
-        motion: Of the hand.
-        later: Joint angles (n,) to which the hand goes straight from there.
+    Where they would be in each other's way, there is none: the driver comes when the hand is there.
     """
-    driver, hand = station.driver, station.holder.name
-    stops = [motion.q[-1], *later]
+    driver, hand, jaws = station.driver, station.holder.name, {station.hand: coming.jaws}
     try:
-        above = _above(station, bolt, stops[-1])[0]
-        way = station.move(driver, above, _holding(station), FINE_CLEARANCE, beside={hand: motion})
+        above = _above(station, bolt, {hand: coming.q_then, **jaws})
+        motion = station.move(
+            driver,
+            above,
+            _holding(station),
+            FINE_CLEARANCE,
+            elsewhere=jaws,
+            beside={hand: coming.motion},
+        )
     except (Unreachable, NoPath):
         return {}
-    # Still arranged as for the move, but for the driver, which is over the bolt by then.
-    clear = all(
-        station.model.are_free({driver.name: above, hand: q})
-        for before, after in pairwise(stops)
-        for q in np.linspace(before, after, 20)
-    )
-    return {driver.name: way} if clear else {}
+    # The last stretch of the hand, with the driver over the bolt; it is as straight as this.
+    stretch = np.linspace(coming.motion.q[-1], coming.q_then, 20)
+    clear = all(station.model.are_free({driver.name: above, hand: q}) for q in stretch)
+    return {driver.name: motion} if clear else {}
