@@ -10,7 +10,7 @@ the middle one where there are several: it stands for the simulated time of all 
     python -m experiments.speed_benchmark --phase tighten --window 0.3
     python -m experiments.speed_benchmark --remake
 
-Classes (`experiments.speed.phase_class`): free, carrying, dwell, contact. Layers
+Classes (`planning.operations.phase_class`): free, carrying, dwell, contact. Layers
 (`experiments.speed.layers`): geometry, constraints, solver, Python. "run" is the mean over all
 phases from start to end in the run that made the states; where it differs from the sum, the machine
 was busier then, or phases do not cost the same from beginning to end: a press begins in the air.
@@ -43,7 +43,6 @@ from experiments.reporting.output import output_folder, whole_file, write_json
 from experiments.reporting.provenance import finite, versions
 from experiments.speed.calibration import Kernel
 from experiments.speed.layers import TimedMonitor, measure_phase
-from experiments.speed.phase_class import PhaseClass
 from experiments.speed.report import (
     Measured,
     append_entry,
@@ -67,6 +66,7 @@ from experiments.speed.whole_run import (
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import plan
 from planning.operations.operation import Step
+from planning.operations.phase_class import PhaseClass
 from planning.operations.sequence import steps
 
 

@@ -32,7 +32,6 @@ from experiments.paper import regress
 from experiments.speed.calibration import Kernel
 from experiments.speed.layers import LAYERS, TimedMonitor, beginning, measure_phase, probe
 from experiments.speed.meter import Meter, changes, ratios, slower
-from experiments.speed.phase_class import PhaseClass, class_of
 from experiments.speed.report import append_entry, latest_entry
 from experiments.speed.whole_run import (
     Outdated,
@@ -43,6 +42,7 @@ from experiments.speed.whole_run import (
 )
 from planning.motion.timing import JointMotion
 from planning.operations.operation import Operation, Step
+from planning.operations.phase_class import PhaseClass, class_of
 from planning.operations.station import Station
 
 TICK = 0.02  # Length of the phases here [s].

@@ -86,14 +86,29 @@ class MotionConfig:
     """Free motion of the arms."""
 
     velocity_scale: float = setting(
-        0.5, "", "Share of the joint speed limits.",
-        "[M] Slip in the jaws grows with it.",
+        0.9, "", "Share of the joint speed limits.",
+        "[A] The rest is for the feedback. Slip in the jaws grows with it [M].",
         above=0.0, at_most=1.0,
     )  # fmt: skip
     acceleration_limit: float = setting(
-        6.0, "rad/s2", "Acceleration limit of every joint.",
-        "[A] Own choice.",
+        12.0, "rad/s2", "Acceleration limit of every joint.",
+        "[A] Own choice; what holds most motions back is the wrist force.",
         above=0.0, at_most=100.0,
+    )  # fmt: skip
+    wrist_force: float = setting(
+        2.5, "N", "Largest force that accelerates tool and payload, along each axis of W.",
+        "[A] In all at most 4.3 N, less than half of what insertions and thrusts take.",
+        above=0.0, at_most=1000.0,
+    )  # fmt: skip
+    ramp_time: float = setting(
+        0.04, "s", "Time in which an acceleration of an arm rises or falls.",
+        "[M] What swings in arm and drives comes to rest within 0.03 s.",
+        at_least=1e-3, at_most=1.0,
+    )  # fmt: skip
+    tool_speed: float = setting(
+        0.25, "m/s", "Speed of a tool on straight stretches beside parts.",
+        "[R] ISO 10218-1: reduced speed, at most 250 mm/s.",
+        above=0.0, at_most=2.0,
     )  # fmt: skip
     arm_clearance: float = setting(
         0.01, "m", "Distance kept between the arms.",

@@ -9,6 +9,8 @@ from cell.simulation.state import State
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.run import Run, StepResult, final_state
+from experiments.assembly.timeline import fixture_bars
+from experiments.reporting.gantt import plot_bars
 from experiments.reporting.html_page import Picture
 from experiments.reporting.output import write_arrays, write_json
 from experiments.reporting.plots import draw, plot_force_plate
@@ -17,6 +19,7 @@ from experiments.reporting.report import write_report
 from planning.assembly_plan.plan_file import plan_to_dict
 from planning.assembly_plan.planner import FixingPlan
 from planning.operations.operation import Arrays
+from planning.operations.phase_class import PhaseClass
 
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 
@@ -49,6 +52,7 @@ def write_results(job: Job, fixing: FixingPlan, run: Run, pictures: Pictures) ->
         plan=plan_to_dict(fixing),
         result=result,
         pictures=pictures.taken,
+        timeline=_timeline(run, log),
         plots=_plots(run, log),
         notes=_notes(run, pictures),
     )
@@ -114,6 +118,14 @@ def _notes(run: Run, pictures: Pictures) -> list[str]:
     if pictures.problem is not None:
         notes.append(f"No pictures: {pictures.problem}.")
     return notes
+
+
+def _timeline(run: Run, log: Arrays) -> list[Picture]:
+    bars = run.timeline.bars
+    if not bars:
+        return []
+    bars = [*bars, *fixture_bars(log, bars)]
+    return [("Arms and fixture", plot_bars(bars, [kind.value for kind in PhaseClass]))]
 
 
 def _plots(run: Run, log: Arrays) -> list[Picture]:

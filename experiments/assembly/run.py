@@ -15,6 +15,7 @@ from cell.simulation.phase import Outcome, Phase, PhaseFailed
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments.assembly.prepare import RunningCell
+from experiments.assembly.timeline import Timeline
 from planning.operations.limits import FailedCheck
 from planning.operations.measures import measure
 from planning.operations.operation import PhaseRecord, Role, Step, StepRecord
@@ -82,6 +83,7 @@ class Run:
         steps: Results so far.
         failure: Why it stopped, if it did.
         done: Names of the steps before this run.
+        timeline: What each arm did in every phase that has ended.
     """
 
     running: RunningCell
@@ -90,8 +92,12 @@ class Run:
     steps: list[StepResult] = field(default_factory=list)
     failure: Failure | None = None
     done: tuple[str, ...] = ()
+    timeline: Timeline = field(init=False)
     _phase: str = ""
     _start: State = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.timeline = Timeline(self.simulation.cell.arms)
 
     @property
     def simulation(self) -> Simulation:
@@ -177,9 +183,10 @@ class Run:
             self._phase = phase.name
             for watcher in self.watchers:
                 watcher.phase(phase.name)
-            start = take_snapshot(self.simulation)
+            start, in_hand = take_snapshot(self.simulation), self.station.in_hand
             outcome = yield phase
             end = take_snapshot(self.simulation)
+            self.timeline.add(record.step.name, phase, in_hand, (start.time, end.time))
             record.phases[phase.subject, phase.kind] = PhaseRecord(
                 start, end, outcome.peak_force, phase.awake
             )

@@ -28,8 +28,8 @@ from experiments.paper.rest import Rest
 from experiments.paper.rig.stage import Observer, Stage
 from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
 from experiments.speed.meter import Meter
-from experiments.speed.phase_class import class_of
 from planning.operations.grasping import HandPhase
+from planning.operations.phase_class import class_of
 from planning.operations.pick_place.phases import PlacePhase, pick_place
 from planning.operations.placement import anywhere
 from planning.operations.push.phases import PushLine, approach, can_push, push

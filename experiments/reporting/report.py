@@ -27,6 +27,7 @@ def write_report(
     plan: Mapping[str, Any],
     result: Mapping[str, Any],
     pictures: Sequence[Picture] = (),
+    timeline: Sequence[Picture] = (),
     plots: Sequence[Picture] = (),
     notes: Sequence[str] = (),
 ) -> None:
@@ -38,7 +39,8 @@ def write_report(
         plan: Content of ``plan.json``; empty if nothing was planned.
         result: Content of ``result.json``, with ``steps`` or ``cases``.
         pictures: Caption and PNG each, in order.
-        plots: The same.
+        timeline: The same, of who did what when.
+        plots: The same, of what was measured.
         notes: Remarks for the reader, for example why there are no pictures.
     """
     config = escape(json.dumps(result.get("config", {}), indent=2, default=str))
@@ -49,6 +51,7 @@ def write_report(
         section("Cases", table(result.get("cases", ()), CASE_COLUMNS)),
         section("Successes and failures", table(_outcomes(result), OUTCOME_COLUMNS)),
         section("Pictures", figures(pictures)),
+        section("Who does what when", figures(timeline)),
         section("Plots", figures(plots)),
         section("Measured", _measured(result)),
         section("Plan", _plan(plan)),

@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
-from experiments.speed.phase_class import PhaseClass
+from planning.operations.phase_class import PhaseClass
 
 SLOWER = 0.15  # A ratio that grew by more than this is worth a warning [A]; runs differ by 5 % [M].
 

@@ -18,8 +18,8 @@ from cell.errors import InputError
 from experiments.reporting.plots import DPI, SIZE, figure_png
 from experiments.speed.layers import LAYERS, Cost, mean_cost
 from experiments.speed.meter import changes
-from experiments.speed.phase_class import PhaseClass
 from experiments.speed.whole_run import PhaseRun
+from planning.operations.phase_class import PhaseClass
 
 ALL = "all"
 COLORS = dict(zip(LAYERS, ("tab:blue", "tab:green", "tab:orange", "tab:red"), strict=True))

@@ -22,8 +22,8 @@ from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments.assembly.prepare import RunningCell
 from experiments.reporting.output import write_arrays, write_json
-from experiments.speed.phase_class import PhaseClass, class_of
 from planning.operations.operation import Step
+from planning.operations.phase_class import PhaseClass, class_of
 from planning.operations.station import Station
 
 INDEX = "phases.json"

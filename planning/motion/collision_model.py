@@ -134,16 +134,22 @@ class CollisionModel:
 
     def is_free(self, arm: str, q: np.ndarray) -> bool:
         """Return whether the arm at ``q`` (dof,) keeps its clearances."""
-        return self._checker.CheckConfigCollisionFree(self._full(arm, q))
+        return self.are_free({arm: q})
+
+    def are_free(self, q: Mapping[str, np.ndarray]) -> bool:
+        """Return whether arms keep their clearances with each at its joint angles (dof,)."""
+        return self._checker.CheckConfigCollisionFree(self._full(q))
 
     def is_edge_free(self, arm: str, q_from: np.ndarray, q_to: np.ndarray) -> bool:
         """Return whether the arm keeps its clearances on the straight way in joint space."""
-        return self._checker.CheckEdgeCollisionFree(self._full(arm, q_from), self._full(arm, q_to))
+        return self._checker.CheckEdgeCollisionFree(
+            self._full({arm: q_from}), self._full({arm: q_to})
+        )
 
     def collisions(self, arm: str, q: np.ndarray) -> tuple[str, ...]:
         """Return which bodies come too close at ``q``: "left_tool palm - tray (-3.2 mm)" ..."""
         reach = max(self._checker.GetLargestPadding(), 0.0) + 1e-6
-        clearance = self._checker.CalcRobotClearance(self._full(arm, q), reach)
+        clearance = self._checker.CalcRobotClearance(self._full({arm: q}), reach)
         nearest: dict[tuple[str, str], float] = {}
         for one, other, distance in zip(
             clearance.robot_indices(), clearance.other_indices(), clearance.distances(), strict=True
@@ -153,12 +159,13 @@ class CollisionModel:
                 nearest[pair] = min(distance, nearest.get(pair, np.inf))
         return tuple(f"{a} - {b} ({d * 1e3:.1f} mm)" for (a, b), d in nearest.items())
 
-    def _full(self, arm: str, q: np.ndarray) -> np.ndarray:
-        """Return the positions of the whole plant with one arm at ``q``."""
-        if arm not in self.arms:
-            raise UnknownName("arm", arm, self.arms)
+    def _full(self, q: Mapping[str, np.ndarray]) -> np.ndarray:
+        """Return the positions of the whole plant with some arms at other joint angles."""
         full = self._q.copy()
-        self.plant.SetPositionsInArray(self.arms[arm].instance, q, full)
+        for arm, q_arm in q.items():
+            if arm not in self.arms:
+                raise UnknownName("arm", arm, self.arms)
+            self.plant.SetPositionsInArray(self.arms[arm].instance, q_arm, full)
         return full
 
     def _positions(self, surroundings: Surroundings) -> np.ndarray:

@@ -1,13 +1,19 @@
-"""How fast a path can be run: the fastest timing within speed, acceleration and torque limits."""
+"""How fast a path can be run: the fastest timing within the limits of arm, wrist and tool.
+
+The arm limits speed, acceleration and torque of its joints. The wrist limits how hard tool and
+payload are thrown about, so that a faster arm neither strains the sensor nor the grip. Beside
+parts, a point of the tool has a speed limit as well.
+"""
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 
 import numpy as np
+from pydrake.math import RigidTransform
 from pydrake.multibody.optimization import Toppra
 from pydrake.multibody.plant import MultibodyPlant
-from pydrake.multibody.tree import SpatialInertia
+from pydrake.multibody.tree import FixedOffsetFrame, Frame, SpatialInertia
 from pydrake.systems.framework import Context
 from pydrake.trajectories import PiecewisePolynomial
 
@@ -19,6 +25,8 @@ from planning.motion.joint_path import JointPath
 GRID_STEP = 0.05  # Between two points at which the limits are imposed [rad] [A].
 INSET = 1e-3  # Of the outermost of these points of a segment, as a share of its length.
 SAMPLE_PERIOD = 0.005  # Of the resulting motion [s] [A].
+CENTRE, POINT = "centre", "point"  # Frames of tool and payload as one lump.
+ANY_TURN = 1e4  # Angular acceleration that no arm reaches [rad/s2].
 TORQUE_SHARE = 0.9  # Of the torque limits; the rest is for the feedback [A].
 
 
@@ -30,6 +38,36 @@ class NoTiming(RunFailure):
             f"The {arm} arm cannot run a path of {length:.2f} rad within its speed, acceleration "
             "and torque limits: gravity alone may exceed them, or the payload is too heavy."
         )
+
+
+@dataclass(frozen=True)
+class Pace:
+    """What a motion keeps to, besides the torque limits of the joints.
+
+    Attributes:
+        velocity_scale: Share of the joints' speed limits.
+        acceleration_limit: Of every joint [rad/s2].
+        wrist_force: Force with which tool and payload are accelerated, along each axis of W [N].
+        ramp_time: In which an acceleration rises or falls [s], above 0.
+    """
+
+    velocity_scale: float
+    acceleration_limit: float
+    wrist_force: float
+    ramp_time: float
+
+
+@dataclass(frozen=True)
+class SpeedLimit:
+    """How fast a point of the tool may go.
+
+    Attributes:
+        frame: Of the tool; its origin is the point.
+        speed: [m/s].
+    """
+
+    frame: Frame
+    speed: float
 
 
 @dataclass(frozen=True)
@@ -51,6 +89,15 @@ class JointMotion:
         """Time from start to end [s]."""
         return float(self.time[-1])
 
+    def delayed(self, delay: float) -> JointMotion:
+        """Return the motion after a wait at its start [s], at least 0."""
+        if delay == 0.0:
+            return self
+        time = np.concatenate([[0.0], self.time + delay])
+        return JointMotion(
+            time, self.q[[0, *range(len(self.q))]], np.vstack([0 * self.v[:1], self.v])
+        )
+
     def at(self, time: float) -> tuple[np.ndarray, np.ndarray]:
         """Return q and v (dof,), by cubic interpolation; at rest before the start and after."""
         if not 0.0 < time < self.duration:
@@ -68,10 +115,10 @@ def time_path(
     arm: Arm,
     context: Context,
     path: JointPath,
+    pace: Pace,
     *,
-    velocity_scale: float,
-    acceleration_limit: float,
     payload: SpatialInertia | None = None,
+    tool_limit: SpeedLimit | None = None,
 ) -> JointMotion:
     """Return the fastest motion along a path, from rest to rest.
 
@@ -79,36 +126,55 @@ def time_path(
         arm: The arm; its joint speed and torque limits apply.
         context: Plant context; the tool's joints count as they are in it.
         path: Where to go.
-        velocity_scale: Share of the speed limits.
-        acceleration_limit: Of every joint [rad/s2].
+        pace: Further limits.
         payload: What the tool holds, about and in the flange frame.
+        tool_limit: Of a point of the tool; None: as fast as the rest allows.
+
+    Raises:
+        NoTiming: It cannot be run within the limits.
     """
     if len(path.waypoints) == 1:
         return JointMotion(np.zeros(1), path.waypoints, np.zeros((1, arm.dof)))
-    plant = _arm_alone(arm, context, payload)
+    inertia = _tool_inertia(arm, context, payload)
+    plant = _arm_alone(arm, context, inertia, tool_limit)
     curve = path.curve()
     toppra = Toppra(curve, plant, _grid(curve))
-    speed = velocity_scale * plant.GetVelocityUpperLimits()
+    speed = pace.velocity_scale * plant.GetVelocityUpperLimits()
     toppra.AddJointVelocityLimit(-speed, speed)
-    toppra.AddJointAccelerationLimit(
-        *(sign * np.full(arm.dof, acceleration_limit) for sign in (-1, 1))
-    )
+    joints = np.full(arm.dof, pace.acceleration_limit)
+    toppra.AddJointAccelerationLimit(-joints, joints)
     toppra.AddJointTorqueLimit(*(sign * TORQUE_SHARE * arm.effort_limits for sign in (-1, 1)))
+    throw = np.full(3, pace.wrist_force / inertia.get_mass())
+    most = np.concatenate([np.full(3, ANY_TURN), throw])
+    toppra.AddFrameAccelerationLimit(plant.GetFrameByName(CENTRE), -most, most)
+    if tool_limit is not None:
+        toppra.AddFrameTranslationalSpeedLimit(plant.GetFrameByName(POINT), tool_limit.speed)
     progress = toppra.SolvePathParameterization()
     if progress is None:
         raise NoTiming(arm.name, path.length)
-    return _sampled(curve, progress)
+    return _sampled(curve, progress, pace.ramp_time)
 
 
-def _arm_alone(arm: Arm, context: Context, payload: SpatialInertia | None) -> MultibodyPlant:
-    """Return the arm with tool and payload as one lump, standing as it does in the cell."""
+def _arm_alone(
+    arm: Arm, context: Context, inertia: SpatialInertia, tool_limit: SpeedLimit | None
+) -> MultibodyPlant:
+    """Return the arm with tool and payload as one lump, standing as it does in the cell.
+
+    Frames of the lump: its mass centre, and the point whose speed is limited.
+    """
     plant = MultibodyPlant(time_step=0.0)
     (instance,) = new_parser(plant).AddModelsFromUrl(model_url(arm.model.sdf))
     base = plant.GetFrameByName(arm.model.base_frame, instance)
     X_WB = arm.plant.GetFrameByName(arm.model.base_frame, arm.instance).CalcPoseInWorld(context)
     plant.WeldFrames(plant.world_frame(), base, X_WB)
-    lump = plant.AddRigidBody("lump", instance, _tool_inertia(arm, context, payload))
+    lump = plant.AddRigidBody("lump", instance, inertia)
     plant.WeldFrames(plant.GetFrameByName(arm.model.flange_frame, instance), lump.body_frame())
+    frames = {CENTRE: RigidTransform(inertia.get_com())}
+    if tool_limit is not None:
+        flange = arm.plant.GetFrameByName(arm.model.flange_frame, arm.instance)
+        frames[POINT] = tool_limit.frame.CalcPose(context, flange)
+    for name, X_LF in frames.items():
+        plant.AddFrame(FixedOffsetFrame(name, lump.body_frame(), X_LF, instance))
     plant.Finalize()
     return plant
 
@@ -138,13 +204,32 @@ def _grid(curve: PiecewisePolynomial) -> np.ndarray:
     return np.concatenate([*points, breaks[-1:]])
 
 
-def _sampled(curve: PiecewisePolynomial, progress: PiecewisePolynomial) -> JointMotion:
-    """Return the curve at regular times, given the distance s(t) travelled on it."""
-    start, end = progress.start_time(), progress.end_time()
-    time = np.linspace(start, end, int(np.ceil((end - start) / SAMPLE_PERIOD)) + 1)
-    s = np.clip(progress.vector_values(time)[0], curve.start_time(), curve.end_time())
-    rate = progress.derivative().vector_values(time)[0]
+def _sampled(
+    curve: PiecewisePolynomial, progress: PiecewisePolynomial, ramp_time: float
+) -> JointMotion:
+    """Return the curve at regular times, given the distance s(t) travelled on it.
+
+    The distance is averaged over the ramp time that has just passed: the way stays the same, and an
+    acceleration that would jump rises evenly over that time. Out of a corner of the way it may then
+    pass the limits by 3 %.
+    """
+    start, duration = progress.start_time(), progress.end_time() - progress.start_time()
+    period = min(SAMPLE_PERIOD, ramp_time) / 5
+    grid = np.linspace(
+        -ramp_time, duration + ramp_time, int(np.ceil((duration + 2 * ramp_time) / period)) + 1
+    )
+    distance = progress.vector_values(start + np.clip(grid, 0.0, duration))[0]
+    area = np.concatenate([[0.0], np.cumsum(np.diff(grid) * (distance[1:] + distance[:-1]) / 2)])
+    end = duration + ramp_time
+    time = np.linspace(0.0, end, int(np.ceil(end / SAMPLE_PERIOD)) + 1)
+
+    def change(values: np.ndarray) -> np.ndarray:
+        now, before = np.interp(time, grid, values), np.interp(time - ramp_time, grid, values)
+        return (now - before) / ramp_time
+
+    s = np.clip(change(area), curve.start_time(), curve.end_time())
+    s[[0, -1]] = curve.start_time(), curve.end_time()
     q = curve.vector_values(s).T
-    v = curve.derivative().vector_values(s).T * rate[:, None]
+    v = curve.derivative().vector_values(s).T * change(distance)[:, None]
     v[[0, -1]] = 0.0
-    return JointMotion(time - start, q, v)
+    return JointMotion(time, q, v)

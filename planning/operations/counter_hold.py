@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Callable, Generator, Iterator, Mapping
+from dataclasses import dataclass
 from enum import Enum
 
+import numpy as np
+
 from cell.products.product import Grasp
-from cell.simulation.phase import Outcome, Phase, motion_finished
+from cell.simulation.phase import Command, Outcome, Phase, motion_finished
+from planning.motion.timing import JointMotion
 from planning.operations.grasping import (
-    HAND_SPEED,
     Reach,
     first,
     grip,
@@ -16,6 +19,26 @@ from planning.operations.grasping import (
     reachable_grasps,
 )
 from planning.operations.station import Station
+from planning.operations.waiting import at_rest
+
+
+@dataclass(frozen=True)
+class Coming:
+    """What the holder is about to do, for whoever moves beside it.
+
+    Attributes:
+        motion: Its planned motion.
+        q_then: Joint angles (n,) to which it goes on straight, if it does.
+        jaws: Positions (2,) of the fingers from soon after the start [m].
+    """
+
+    motion: JointMotion
+    q_then: np.ndarray
+    jaws: np.ndarray
+
+
+# What another arm does while the holder moves.
+Meanwhile = Callable[[Coming], Mapping[str, Command]]
 
 
 class HoldPhase(Enum):
@@ -26,26 +49,33 @@ class HoldPhase(Enum):
     PARK = "park"
 
 
-def hold(station: Station, part: str) -> Generator[Phase, Outcome, Grasp]:
+def hold(station: Station, part: str, meanwhile: Meanwhile) -> Generator[Phase, Outcome, Grasp]:
     """Yield the phases with which the hand grips an assembled part; return the grasp.
 
-    Its belief is fresh. `planning.operations.grasping.let_go` lets go of it.
+    The belief about everything is fresh. `planning.operations.grasping.let_go` lets go of it.
     """
     arm, gripper = station.holder, station.cell.gripper
     reach = first(_from_the_side(station, part), part, station)
+    motion = station.move(arm, reach.q_before, [(station.hand, part)])
+    jaw = opened(gripper.model, reach.grasp)
     yield Phase(
         HoldPhase.APPROACH,
         motion_finished,
         timeout=20.0,
         subject=part,
         commands={
-            arm.name: station.move(arm, reach.q_before, [(station.hand, part)]),
-            gripper.name: opened(gripper.model, reach.grasp),
+            arm.name: motion,
+            gripper.name: jaw,
+            **meanwhile(Coming(motion, reach.q_at, np.full(2, jaw.opening / 2))),
         },
     )
-    line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw, speed=HAND_SPEED)
+    line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw)
     yield Phase(
-        HoldPhase.REACH, motion_finished, timeout=10.0, subject=part, commands={arm.name: line}
+        HoldPhase.REACH,
+        at_rest(arm.name),
+        timeout=10.0,
+        subject=part,
+        commands={arm.name: line},
     )
     yield from grip(station, part, reach.grasp, awake=frozenset(station.fixed))
     return reach.grasp
@@ -62,13 +92,15 @@ def _from_the_side(station: Station, part: str) -> Iterator[Reach]:
     return reachable_grasps(station, part, X_WP, grasps)
 
 
-def park(station: Station) -> Iterator[Phase]:
+def park(station: Station, meanwhile: Meanwhile) -> Iterator[Phase]:
     """Yield the phase that takes the holder home, out of the driver's way."""
     arm = station.holder
+    motion = station.move(arm, arm.home)
+    jaws = station.cell.plant.GetPositions(station.context, arm.tool_instance)
     yield Phase(
         HoldPhase.PARK,
         motion_finished,
         20.0,
         subject=f"{arm.name} arm",
-        commands={arm.name: station.move(arm, arm.home)},
+        commands={arm.name: motion, **meanwhile(Coming(motion, arm.home, jaws))},
     )

@@ -12,16 +12,14 @@ from pydrake.math import RigidTransform
 from cell.machines.arm import Unreachable
 from cell.machines.grippers import GripperModel
 from cell.products.product import Grasp
-from cell.simulation.phase import Guard, Jaw, Outcome, Phase, Sensed, after, motion_finished
+from cell.simulation.phase import Guard, Jaw, Outcome, Phase, Sensed, motion_finished
 from planning.operations.look import look
 from planning.operations.station import Station
+from planning.operations.waiting import at_rest, steady_jaws
 
 APPROACH = 0.05  # The jaw comes the last stretch straight along its own z [m] [A].
 CLEARANCE = 0.004  # The jaws open this much wider than the part [m] [A].
-HAND_SPEED = 0.08  # Of the hand on straight stretches [m/s] [A].
-RELEASE_TIME = 0.15  # Opening by twice the clearance takes half of it at 0.15 m/s [D].
 CLEAR = 0.012  # The jaws have left the part when they are this far back [m] [A].
-GRIP_TIME = 0.25  # Closing and building up the force [s] [A].
 # A jaw that closes this much further than when it gripped holds nothing any more [m].
 LOST = 0.0015
 
@@ -166,9 +164,13 @@ def seize(
             gripper.name: opened(gripper.model, reach.grasp),
         },
     )
-    line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw, speed=HAND_SPEED)
+    line = station.line(arm, arm.frame(reach.grasp.jaw), reach.X_WJaw)
     yield Phase(
-        HandPhase.DESCEND, motion_finished, timeout=10.0, subject=part, commands={arm.name: line}
+        HandPhase.DESCEND,
+        at_rest(arm.name),
+        timeout=10.0,
+        subject=part,
+        commands={arm.name: line},
     )
     yield from grip(station, part, reach.grasp)
     station.carry(part, riders)
@@ -181,12 +183,9 @@ def grip(
     gripper = station.cell.gripper
     opening = tip_opening(gripper.model, grasp)
 
-    def at_rest(sensed: Sensed) -> bool:
-        return sensed.time >= GRIP_TIME and abs(sensed.grippers[gripper.name].rate) < 1e-3
-
     outcome: Outcome = yield Phase(
         HandPhase.GRIP,
-        at_rest,
+        steady_jaws(gripper.name),
         timeout=2.0,
         subject=part,
         commands={gripper.name: Jaw(opening, grasp.force)},
@@ -210,7 +209,7 @@ def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[P
         timeout=10.0,
         subject=part,
         commands={
-            arm.name: station.line(arm, arm.frame(reach.grasp.jaw), up, speed=HAND_SPEED),
+            arm.name: station.line(arm, arm.frame(reach.grasp.jaw), up),
         },
         guard=guard,
         awake=awake,
@@ -235,7 +234,7 @@ def let_go(
     arm, gripper = station.holder, station.cell.gripper
     yield Phase(
         HandPhase.RELEASE,
-        after(RELEASE_TIME),
+        steady_jaws(gripper.name),
         timeout=1.0,
         subject=part,
         commands={gripper.name: opened(gripper.model, grasp)},
@@ -247,7 +246,7 @@ def let_go(
         (HandPhase.CLEAR, CLEAR, awake),
         (HandPhase.RETREAT, retreat, frozenset[str]()),
     ):
-        line = station.line(arm, frame, backed_off(X_WJaw, distance), speed=HAND_SPEED)
+        line = station.line(arm, frame, backed_off(X_WJaw, distance))
         yield Phase(
             kind,
             motion_finished,

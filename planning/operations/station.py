@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -17,11 +17,13 @@ from cell.products.product import Part
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
 from planning.motion.paths import plan_line, plan_path
-from planning.motion.timing import JointMotion, time_path
+from planning.motion.timing import JointMotion, Pace, SpeedLimit, time_path
+from planning.motion.together import delayed_beside
 from planning.operations.planning_copy import collision_model
 from planning.perception.belief import Belief, Source, State
 
 FINE_CLEARANCE = 5e-4  # Kept next to neighbours of a hole; smaller than any gap there [m] [A].
+UNFELT = 0.2  # Share of a force under which it is not taken for that force [A].
 FIXTURE = "jig_base"  # The model instance that carries the fixture.
 SAVED = "station/"  # Before the names in a saved state.
 
@@ -141,16 +143,26 @@ class Station:
         return arm.frame(frame).CalcPoseInWorld(self.context)
 
     def surroundings(
-        self, may_touch: Iterable[tuple[str, str]] = (), clearance: float | None = None
+        self,
+        may_touch: Iterable[tuple[str, str]] = (),
+        clearance: float | None = None,
+        elsewhere: Mapping[str, np.ndarray] | None = None,
     ) -> Surroundings:
-        """Return everything as it is believed to be now, without parts that were never seen."""
+        """Return everything as it is believed to be now, without parts that were never seen.
+
+        Args:
+            may_touch: Pairs that are not checked, see `Surroundings`.
+            clearance: Least distance to what is not a robot [m]; None: the configured one.
+            elsewhere: Joint positions (n,) of some arms by name, or of the hand, where they will
+                not be what they are now.
+        """
+        context, elsewhere = self.context, elsewhere or {}
+        q_jaws = self.cell.plant.GetPositions(context, self.holder.tool_instance)
         X_HandW = self.tool_pose(self.holder, "tip").inverse()
         others = [name for name in self.belief.estimates if name not in self.in_hand]
         return Surroundings(
-            arms={arm.name: arm.positions(self.context) for arm in self.cell.arms.values()},
-            tools={
-                self.hand: self.cell.plant.GetPositions(self.context, self.holder.tool_instance)
-            },
+            arms={n: elsewhere.get(n, a.positions(context)) for n, a in self.cell.arms.items()},
+            tools={self.hand: elsewhere.get(self.hand, q_jaws)},
             X_WP={name: self.pose_of(name) for name in others},
             X_HandP={name: X_HandW @ self.pose_of(name) for name in self.in_hand},
             may_touch=tuple(may_touch),
@@ -165,6 +177,7 @@ class Station:
         near: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
+        elsewhere: Mapping[str, np.ndarray] | None = None,
     ) -> list[np.ndarray]:
         """Return the collision-free joint angles (n,) [rad] with a tool frame at a pose.
 
@@ -175,8 +188,9 @@ class Station:
             near: (n,) joint angles; the nearest solution comes first.
             may_touch: Pairs that are not checked, see `Surroundings`.
             clearance: Least distance to what is not a robot [m]; None: the configured one.
+            elsewhere: See `surroundings`.
         """
-        self.model.arrange(self.surroundings(may_touch, clearance))
+        self.model.arrange(self.surroundings(may_touch, clearance, elsewhere))
         solutions = arm.configurations(self.context, frame, X_WF, near)
         return [q for q in solutions if arm.model.is_regular(q) and self.model.is_free(arm.name, q)]
 
@@ -205,13 +219,27 @@ class Station:
         q_goal: np.ndarray,
         may_touch: Iterable[tuple[str, str]] = (),
         clearance: float | None = None,
+        elsewhere: Mapping[str, np.ndarray] | None = None,
+        beside: Mapping[str, JointMotion] | None = None,
     ) -> JointMotion:
         """Return a collision-free motion from where the arm is to ``q_goal`` (n,) [rad].
+
+        Args:
+            arm: The arm.
+            q_goal: Where to.
+            may_touch: Pairs that are not checked, see `Surroundings`.
+            clearance: Least distance to what is not a robot [m]; None: the configured one.
+            elsewhere: See `surroundings`.
+            beside: Motions of other arms, by name, that start together with this one; the arm waits
+                at its start as long as it would come too close to them. None: all others stand.
 
         Raises:
             NoPath: None was found.
         """
-        self.model.arrange(self.surroundings(may_touch, clearance))
+        beside = beside or {}
+        ends = {name: motion.q[-1] for name, motion in beside.items()}
+        elsewhere = {**(elsewhere or {}), **ends}
+        self.model.arrange(self.surroundings(may_touch, clearance, elsewhere))
         self._calls += 1
         path = plan_path(
             self.model,
@@ -221,7 +249,8 @@ class Station:
             seed=self.seed * 1009 + self._calls,
             max_iterations=self.config.motion.max_iterations,
         )
-        return self._timed(arm, path)
+        motion = self._timed(arm, path, self.config.motion.wrist_force)
+        return delayed_beside(self.model, arm.name, motion, beside) if beside else motion
 
     def line(
         self,
@@ -229,7 +258,8 @@ class Station:
         frame: Frame,
         X_WGoal: RigidTransform,
         *,
-        speed: float,
+        speed: float | None = None,
+        felt: float | None = None,
         q_start: np.ndarray | None = None,
     ) -> JointMotion:
         """Return the motion that takes a tool frame straight to a pose.
@@ -240,7 +270,9 @@ class Station:
             arm: The arm.
             frame: Of its tool.
             X_WGoal: Where the frame goes.
-            speed: Largest mean speed of the frame's origin [m/s].
+            speed: Largest speed of the frame's origin [m/s]; None: that of tools beside parts.
+            felt: Force at the wrist that the motion, or what follows it, is watched for [N]: the
+                tool is thrown about with much less, for braking must not feel like touching.
             q_start: (n,) where it begins [rad]; None: where the arm is.
 
         Raises:
@@ -249,24 +281,18 @@ class Station:
         """
         q_start = arm.positions(self.context) if q_start is None else q_start
         path = plan_line(arm, self.context, frame, q_start, X_WGoal)
-        start = arm.tool_pose(self.context, frame, q_start)
-        distance = float(np.linalg.norm(X_WGoal.translation() - start.translation()))
-        motion = self._timed(arm, path)
-        slower = distance / speed / motion.duration if motion.duration > 0 else 1.0
-        if slower <= 1.0:
-            return motion
-        return replace(motion, time=motion.time * slower, v=motion.v / slower)
-
-    def _timed(self, arm: Arm, path: JointPath) -> JointMotion:
         motion = self.config.motion
-        return time_path(
-            arm,
-            self.context,
-            path,
-            velocity_scale=motion.velocity_scale,
-            acceleration_limit=motion.acceleration_limit,
-            payload=self._payload() if arm is self.holder else None,
-        )
+        limit = SpeedLimit(frame, motion.tool_speed if speed is None else speed)
+        throw = np.inf if felt is None else UNFELT * felt
+        return self._timed(arm, path, min(throw, motion.wrist_force), limit)
+
+    def _timed(
+        self, arm: Arm, path: JointPath, wrist_force: float, tool_limit: SpeedLimit | None = None
+    ) -> JointMotion:
+        motion = self.config.motion
+        pace = Pace(motion.velocity_scale, motion.acceleration_limit, wrist_force, motion.ramp_time)
+        payload = self._payload() if arm is self.holder else None
+        return time_path(arm, self.context, path, pace, payload=payload, tool_limit=tool_limit)
 
     def _payload(self) -> SpatialInertia | None:
         """Return what hangs on the hand, about and in the flange frame; None if it is empty."""

@@ -15,7 +15,7 @@ from cell.errors import RunFailure
 from experiments.paper.rig.rig import HandPose, Rig
 from experiments.paper.rig.stage import Observer
 from experiments.speed.meter import Meter
-from experiments.speed.phase_class import classify
+from planning.operations.phase_class import classify
 from planning.operations.stroke import Stroke
 
 

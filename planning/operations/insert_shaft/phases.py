@@ -8,7 +8,6 @@ found the hole. It ends when the part stands still; whether it is seated is meas
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
 from enum import Enum
 
 import numpy as np
@@ -19,7 +18,6 @@ from cell.configuration.config import InsertionConfig
 from cell.products.joints import Fit
 from cell.simulation.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
 from planning.operations.grasping import (
-    HAND_SPEED,
     Reach,
     comes_from_above,
     first,
@@ -33,6 +31,7 @@ from planning.operations.grasping import (
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import Station
+from planning.operations.waiting import Steady, steady_wrist
 
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].
@@ -40,8 +39,8 @@ NEAR = 0.002  # The hand goes soft this far before shaft and hole can meet [m] [
 LANDING = 0.001  # Slow from this far above the seat to this far below it [m] [A].
 BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand presses [m] [A].
 RETREAT = 0.08
-STALL_SPEED = 5e-4  # Slower than this is standing [m/s].
 STALL_TIME = 0.25
+STALLED = 1.25e-4  # What moves less than this in the stall time stands: 0.5 mm/s [m].
 PATIENCE = 5.0  # For coming to a stand under the whole force [s] [A].
 YAW_STIFFNESS = 40.0  # About the axis of the hole; the bolt holes must meet [N m/rad] [A].
 LATERAL_LIMIT = 15.0  # [N] [A]
@@ -58,6 +57,7 @@ class InsertPhase(Enum):
     TRANSFER = "transfer"
     LOOK_OVER_SHAFT = "look over the shaft"
     ALIGN = "align"
+    HOVER = "hover"
     INSERT = "insert"
     SEARCH = "search"
     INSERT_AGAIN = "insert again"
@@ -66,22 +66,6 @@ class InsertPhase(Enum):
 
 # Those in which the hand is soft, in their order.
 SOFT = (InsertPhase.INSERT, InsertPhase.SEARCH, InsertPhase.INSERT_AGAIN, InsertPhase.PRESS)
-
-
-@dataclass
-class Stalled:
-    """End condition: a tool point has stood still for a while."""
-
-    position: Callable[[Sensed], np.ndarray]
-    _since: float = 0.0
-    _last: np.ndarray | None = field(default=None)
-
-    def __call__(self, sensed: Sensed) -> bool:
-        """Return whether the point has moved less than the stall speed for the stall time."""
-        here = self.position(sensed)
-        if self._last is None or np.linalg.norm(here - self._last) > STALL_SPEED * STALL_TIME:
-            self._last, self._since = here, sensed.time
-        return sensed.time - self._since >= STALL_TIME
 
 
 def carry_out(station: Station, step: Step) -> Iterator[Phase]:
@@ -120,9 +104,13 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         motion_finished,
         timeout=10.0,
         subject=part,
-        commands={arm.name: station.line(arm, jaw, near, speed=HAND_SPEED / 2)},
+        commands={arm.name: station.line(arm, jaw, near)},
         guard=holding,
         awake=held,
+    )
+    # The wrist is tared at rest.
+    yield Phase(
+        InsertPhase.HOVER, steady_wrist(arm.name), 1.0, subject=part, guard=holding, awake=held
     )
     yield from _insert(station, fit, X_WGoal, jaw, X_JawP, both)
     yield from let_go(station, part, reach.grasp, RETREAT, both)
@@ -239,7 +227,7 @@ def descent(
     heights = [start, LANDING, -LANDING, -BEYOND]
     speeds = [config.speed, config.landing_speed, config.speed]
     times = np.cumsum([0.0, *(-np.diff(heights) / speeds)])
-    stalled = Stalled(height)
+    stalled = Steady(height, STALLED, STALL_TIME)
 
     def target(t: float) -> RigidTransform:
         return raised(X_WSeat, float(np.interp(t, times, heights)))
@@ -255,7 +243,7 @@ def pressing(
 ) -> tuple[Target, Condition, float]:
     """Return target, end condition and time-out of a push straight down from where the part is."""
     below = raised(X_WC, -BEYOND)
-    return lambda t: below, Stalled(height), PATIENCE
+    return lambda t: below, Steady(height, STALLED, STALL_TIME), PATIENCE
 
 
 def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:

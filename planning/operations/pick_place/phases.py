@@ -33,15 +33,14 @@ from planning.operations.placement import (
     choose_placement,
 )
 from planning.operations.station import FIXTURE, Station
+from planning.operations.waiting import steady_wrist
 
 LIFT = 0.12  # Out of the tray, over its neighbours [m] [A].
-PRESS_SPEED = 0.01  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M].
+PRESS_SPEED = 0.02  # [m/s] [A]; the bed has no rate effect at 10 to 80 mm/s [M].
 # Pressing fails if the bed has not resisted this far below its apex [m] [A]: the plate's foot is
 # 15 mm deep before its face comes to lie on the bed.
 DEEPEST = 0.03
 LOOK_TIME = 0.2  # The part comes to rest in the tray [s] [A].
-HOVER_TIME, STOP_TIME = 0.1, 0.2  # [s] [A]
-JAM_TIME = 1.5  # [s] [D] a pump of 30 L/min is at 90 kPa after 0.5 to 1.5 s.
 SETTLE_TIME = 1.0
 
 
@@ -106,15 +105,18 @@ def pick_place(
         awake=awake,
     )
     # The wrist is tared at rest: the braking arm feels 2 N of its own [M].
-    yield Phase(PlacePhase.HOVER, after(HOVER_TIME), 1.0, subject=part, guard=holding, awake=awake)
+    yield Phase(
+        PlacePhase.HOVER, steady_wrist(arm.name), 1.0, subject=part, guard=holding, awake=awake
+    )
     down = HOVER + DEEPEST
     force = station.config.placement.press_force
+    line = station.line(arm, frame, raised(X_WJaw, -down), speed=PRESS_SPEED, felt=force)
     yield Phase(
         PlacePhase.PRESS,
         lambda sensed: sensed.wrench[arm.name][5] >= force,
         timeout=1.0 + down / PRESS_SPEED,
         subject=part,
-        commands={arm.name: station.line(arm, frame, raised(X_WJaw, -down), speed=PRESS_SPEED)},
+        commands={arm.name: line},
         guard=holding,
         start=(receive_part(part),),
         awake=awake,
@@ -122,16 +124,18 @@ def pick_place(
     # The hand comes to rest first: what moves then is not moved by the fixing.
     yield Phase(
         PlacePhase.STOP,
-        after(STOP_TIME),
+        steady_wrist(arm.name),
         1.0,
         subject=part,
         guard=holding,
         awake=awake,
         tare=False,
     )
+    # The bed moves a little as it freezes: the hand waits until that is over.
+    carried = steady_wrist(arm.name)
     yield Phase(
         PlacePhase.FIX,
-        lambda sensed: sensed.time >= JAM_TIME and fixture.fixed(root),
+        lambda sensed: fixture.fixed(root) and carried(sensed),
         timeout=5.0,
         subject=part,
         guard=holding,

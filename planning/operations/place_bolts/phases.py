@@ -14,7 +14,6 @@ from pydrake.math import RigidTransform
 
 from cell.simulation.phase import Phase, Sensed, motion_finished
 from planning.operations.grasping import (
-    HAND_SPEED,
     Reach,
     jaw_to_part,
     let_go,
@@ -34,7 +33,7 @@ CLEAR_ABOVE = 0.045  # Transfers end this far above where the bolt will stand [m
 ABOVE = 0.012  # The bolt is looked at once more this far above, its tip over the hole [m] [A].
 ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
 TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
-SLOW = 0.02  # [m/s] [A]
+SLOW = 0.04  # [m/s] [A]
 RETREAT = 0.05
 
 
@@ -87,12 +86,12 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         guard=holding,
         awake=held,
     )
-    for look_kind, kind, height, speed in (
-        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, ABOVE, HAND_SPEED),
-        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, ENTRY, SLOW),
+    for look_kind, kind, height in (
+        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, ABOVE),
+        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, ENTRY),
     ):
         yield from look(station, look_kind, bolt, [bolt], awake=held, guard=holding)
-        line = station.line(arm, jaw, at(raised(X_WMouth, height)), speed=speed)
+        line = station.line(arm, jaw, at(raised(X_WMouth, height)))
         yield Phase(
             kind,
             motion_finished,
@@ -110,12 +109,14 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     def stands(sensed: Sensed) -> bool:
         return sensed.finished or bool(sensed.wrench[arm.name][5] > TOUCH_FORCE)
 
+    under = at(raised(X_WStand, -2e-4))
+    down = station.line(arm, jaw, under, speed=SLOW, felt=TOUCH_FORCE)
     yield Phase(
         BoltPhase.LOWER,
         stands,
         timeout=10.0,
         subject=bolt,
-        commands={arm.name: station.line(arm, jaw, at(raised(X_WStand, -2e-4)), speed=SLOW)},
+        commands={arm.name: down},
         guard=holding,
         awake=awake,
     )

@@ -14,7 +14,6 @@ from cell.machines.arm import Unreachable
 from cell.simulation.phase import Jaw, Phase, motion_finished
 from planning.motion.paths import NoPath, plan_line
 from planning.motion.timing import JointMotion
-from planning.operations.grasping import HAND_SPEED
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FIXTURE, Station
@@ -111,7 +110,7 @@ def approach(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
         },
     )
     for kind, distance in ((PushPhase.DOWN, -BEHIND), (PushPhase.START, 0.0)):
-        motion = station.line(arm, arm.frame("tip"), line.at(distance), speed=HAND_SPEED)
+        motion = station.line(arm, arm.frame("tip"), line.at(distance))
         yield Phase(kind, motion_finished, timeout=10.0, commands={arm.name: motion})
 
 

@@ -14,7 +14,6 @@ from pydrake.math import RigidTransform
 from cell.simulation.events import free_part, release_part
 from cell.simulation.phase import Phase, Sensed, after, motion_finished
 from planning.operations.grasping import (
-    HAND_SPEED,
     Reach,
     comes_from_above,
     first,
@@ -33,7 +32,7 @@ from planning.operations.station import Station
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the place [m] [A].
 LANDING = 0.003  # Slow from this far above the place on [m] [A].
-SLOW = 0.01  # [m/s] [A]
+SLOW = 0.015  # [m/s] [A]
 BELOW = 0.001  # The hand sinks at most this far below where the part stood before [m] [A].
 TOUCH_FORCE = 3.0  # The part stands when it pushes back this hard [N] [A].
 RETREAT = 0.08
@@ -95,7 +94,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         motion_finished,
         timeout=10.0,
         subject=part,
-        commands={arm.name: station.line(arm, jaw, near, speed=HAND_SPEED / 2)},
+        commands={arm.name: station.line(arm, jaw, near)},
         guard=holding,
         awake=awake,
     )
@@ -108,7 +107,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         stands,
         timeout=5.0,
         subject=part,
-        commands={arm.name: station.line(arm, jaw, under, speed=SLOW)},
+        commands={arm.name: station.line(arm, jaw, under, speed=SLOW, felt=TOUCH_FORCE)},
         guard=holding,
         awake=awake,
     )

@@ -7,7 +7,7 @@ way.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -15,18 +15,28 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.machines.arm import Unreachable
-from cell.simulation.phase import Follow, Outcome, Phase, Sensed, Spin, after, motion_finished
+from cell.simulation.phase import (
+    Command,
+    Follow,
+    Outcome,
+    Phase,
+    Sensed,
+    Spin,
+    after,
+    motion_finished,
+)
 from cell.workpieces.thread import BIT_SEAT
+from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
-from planning.operations.counter_hold import hold, park
+from planning.operations.counter_hold import Coming, hold, park
 from planning.operations.grasping import backed_off, let_go, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.waiting import at_rest
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
-LEAVE_SPEED = 0.1  # Of the bit out of it [m/s] [A].
-PLUNGE_SPEED = 0.04  # Of the bit down to the socket [m/s] [A].
+PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
 FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
 SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
 FEED_DEPTH = 0.008  # The feed can follow the bolt this far [m]: engaged length and reserve.
@@ -131,15 +141,20 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     """Yield the phases that tighten every bolt of a step."""
     clamped = station.cell.product.screws[step.parts[0]].clamps
     assembly = frozenset([*station.fixed, *step.parts])
+    order = star_order(station, step.parts)
     yield from look(station, DrivePhase.LOOK, clamped)
+
+    def meanwhile(coming: Coming) -> dict[str, Command]:
+        return _come_beside(station, order[0], coming)
+
     if station.config.driver.counter_hold:
-        grasp = yield from hold(station, clamped)
-        for bolt in star_order(station, step.parts):
+        grasp = yield from hold(station, clamped, meanwhile)
+        for bolt in order:
             yield from tighten_bolt(station, bolt)
         yield from let_go(station, clamped, grasp, RETREAT, assembly)
     else:
-        yield from park(station)
-        for bolt in star_order(station, step.parts):
+        yield from park(station, meanwhile)
+        for bolt in order:
             yield from tighten_bolt(station, bolt)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
     yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
@@ -155,10 +170,8 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     mating = frozenset([frozenset([screw.into, screw.clamps])])
 
     yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
-    holding = [(station.hand, part) for part in station.fixed]
-    above = _driver_configuration(
-        station, backed_off(_socket_pose(station, bolt), BIT_HOVER), holding
-    )
+    holding = _holding(station)
+    above = _above(station, bolt)
     yield Phase(
         DrivePhase.DRIVER_ABOVE,
         motion_finished,
@@ -173,11 +186,12 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     yield from look(station, DrivePhase.LOOK_AT_HEAD, bolt, [bolt], awake=_awake(station))
     R_WE = station.tool_pose(driver, "tool_tip").rotation()
     X_WE = RigidTransform(R_WE, _socket_pose(station, bolt).translation())
+    arrived = at_rest(driver.name)
     outcome = yield Phase(
         DrivePhase.BIT_IN,
         # That the hex has dropped into the socket is told by the model of the joint between them,
         # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
-        lambda sensed: sensed.finished and threads.bit_engaged(root, bolt),
+        lambda sensed: arrived(sensed) and threads.bit_engaged(root, bolt),
         timeout=5.0,
         subject=bolt,
         commands={
@@ -236,7 +250,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         motion_finished,
         timeout=5.0,
         subject=bolt,
-        commands={driver.name: station.line(driver, tip, off, speed=LEAVE_SPEED)},
+        commands={driver.name: station.line(driver, tip, off, felt=config.driver.push_force)},
         awake=awake,
     )
 
@@ -252,21 +266,56 @@ def _socket_pose(station: Station, bolt: str) -> RigidTransform:
     return RigidTransform(RotationMatrix.MakeXRotation(np.pi), p_WE)
 
 
-def _driver_configuration(
-    station: Station, X_WE: RigidTransform, may_touch: Sequence[tuple[str, str]]
+def _holding(station: Station) -> list[tuple[str, str]]:
+    """Return the pairs that may come close while the hand holds the assembly."""
+    return [(station.hand, part) for part in station.fixed]
+
+
+def _above(
+    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
 ) -> np.ndarray:
-    """Return the nearest configuration (n,) with the driver turned any way about its own axis.
+    """Return the nearest configuration (n,) over a bolt's head, turned any way about its axis.
+
+    Args:
+        station: The planner's view of the cell.
+        bolt: Name of the bolt.
+        elsewhere: See `Station.surroundings`.
 
     Raises:
         Unreachable: There is none.
     """
-    driver = station.driver
+    driver, holding = station.driver, _holding(station)
     tip, near = driver.frame("tool_tip"), driver.positions(station.context)
+    X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
     found: list[np.ndarray] = []
     for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
         X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
-        found += station.configurations(driver, tip, X, near, may_touch, clearance=FINE_CLEARANCE)
+        found += station.configurations(driver, tip, X, near, holding, FINE_CLEARANCE, elsewhere)
     if not found:
         reason = "no turn of the driver keeps clear there"
         raise Unreachable(driver.name, tip.name(), X_WE, reason)
     return min(found, key=lambda q: float(np.max(np.abs(q - near))))
+
+
+def _come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:
+    """Return the command that brings the driver over a bolt while the hand comes, too.
+
+    Where they would be in each other's way, there is none: the driver comes when the hand is there.
+    """
+    driver, hand, jaws = station.driver, station.holder.name, {station.hand: coming.jaws}
+    try:
+        above = _above(station, bolt, {hand: coming.q_then, **jaws})
+        motion = station.move(
+            driver,
+            above,
+            _holding(station),
+            FINE_CLEARANCE,
+            elsewhere=jaws,
+            beside={hand: coming.motion},
+        )
+    except (Unreachable, NoPath):
+        return {}
+    # The last stretch of the hand, with the driver over the bolt; it is as straight as this.
+    stretch = np.linspace(coming.motion.q[-1], coming.q_then, 20)
+    clear = all(station.model.are_free({driver.name: above, hand: q}) for q in stretch)
+    return {driver.name: motion} if clear else {}

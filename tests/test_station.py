@@ -1,0 +1,55 @@
+"""Motions of one arm beside those of another are planned around where that one will be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from pydrake.math import RigidTransform, RollPitchYaw
+
+from cell.configuration.config import CellConfig
+from cell.products.loading import load_product
+from experiments.assembly.prepare import running_cell
+from planning.motion.paths import NoPath
+from planning.motion.together import keep_apart
+from planning.operations.station import Station
+
+DOWN = RollPitchYaw(np.pi, 0.0, 0.0)
+
+
+@pytest.fixture(scope="module")
+def station() -> Station:
+    return running_cell(load_product("motor_unit"), CellConfig(), 0)[1]
+
+
+def over_jig(station: Station, arm: str, height: float) -> np.ndarray:
+    """Return joint angles with the tool over the jig, the other arm being where it is."""
+    moving = station.cell.arms[arm]
+    frame = moving.frame("tip" if moving is station.holder else "tool_tip")
+    x, y, _ = station.cell.X_WJ.translation()
+    pose = RigidTransform(DOWN, [x, y, height])
+    return station.configuration(moving, frame, pose, moving.home)
+
+
+def test_driver_does_not_come_where_the_hand_will_be(station: Station) -> None:
+    """Both places are free now: the hand is on its way to one of them."""
+    holder, driver = station.holder, station.driver
+    motion = station.move(holder, over_jig(station, holder.name, 0.40))
+    q_above = over_jig(station, driver.name, 0.42)
+    with pytest.raises(NoPath, match=f"the goal collides .*{holder.name}_tool"):
+        station.move(driver, q_above, beside={holder.name: motion})
+
+
+def test_driver_that_moves_beside_the_hand_keeps_clear_of_it(station: Station) -> None:
+    holder, driver = station.holder, station.driver
+    motion = station.move(holder, over_jig(station, holder.name, 0.40))
+    goal = driver.home + [0.3, 0.0, 0.0, 0.0, 0.0, 0.5]
+    beside = station.move(driver, goal, beside={holder.name: motion})
+    np.testing.assert_allclose(beside.q[-1], goal)
+    assert keep_apart(station.model, {holder.name: motion, driver.name: beside})
+
+
+def test_jaws_that_are_about_to_open_count_as_open(station: Station) -> None:
+    jaws = np.array([0.02, 0.02])
+    arranged = station.surroundings(elsewhere={station.hand: jaws})
+    np.testing.assert_array_equal(arranged.tools[station.hand], jaws)
+    np.testing.assert_array_equal(arranged.arms[station.driver.name], station.driver.home)
