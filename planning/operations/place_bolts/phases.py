@@ -34,7 +34,7 @@ CLEAR_ABOVE = 0.045  # Transfers end this far above where the bolt will stand [m
 ABOVE = 0.012  # The bolt is looked at once more this far above, its tip over the hole [m] [A].
 ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
 TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
-SLOW = 0.04  # [m/s] [A]
+SLOW = 0.04  # At most, down to the seat [m/s] [A].
 RETREAT = 0.05
 
 
