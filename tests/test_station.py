@@ -53,3 +53,21 @@ def test_jaws_that_are_about_to_open_count_as_open(station: Station) -> None:
     arranged = station.surroundings(elsewhere={station.hand: jaws})
     np.testing.assert_array_equal(arranged.tools[station.hand], jaws)
     np.testing.assert_array_equal(arranged.arms[station.driver.name], station.driver.home)
+
+
+def test_straight_lines_are_checked_against_the_other_arm_only() -> None:
+    """Into the jig's base it goes, for a line ends at what it is about; not into the driver."""
+    station = running_cell(load_product("motor_unit"), CellConfig(), 0)[1]
+    holder, driver, tip = station.holder, station.driver, station.holder.frame("tip")
+    x, y, z = station.cell.X_WJ.translation()
+    station.cell.plant.SetPositions(
+        station.context, holder.instance, over_jig(station, holder.name, z + 0.2)
+    )
+    down = station.line(holder, tip, RigidTransform(DOWN, [x, y, z]))
+    assert station.clear_of_arms(holder, down)
+    q_near = station.configuration(
+        driver, driver.frame("tool_tip"), RigidTransform(DOWN, [x + 0.12, y, z + 0.1]), driver.home
+    )
+    station.cell.plant.SetPositions(station.context, driver.instance, q_near)
+    across = station.line(holder, tip, RigidTransform(DOWN, [x + 0.12, y, z + 0.2]))
+    assert not station.clear_of_arms(holder, across)

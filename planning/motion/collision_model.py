@@ -58,7 +58,7 @@ class Surroundings:
     """
 
     arms: Mapping[str, np.ndarray] = field(default_factory=dict)
-    tools: Mapping[str, Sequence[float]] = field(default_factory=dict)
+    tools: Mapping[str, Sequence[float] | np.ndarray] = field(default_factory=dict)
     X_WP: Mapping[str, RigidTransform] = field(default_factory=dict)
     X_HandP: Mapping[str, RigidTransform] = field(default_factory=dict)
     may_touch: Iterable[tuple[str, str]] = ()

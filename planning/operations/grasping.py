@@ -13,6 +13,7 @@ from cell.machines.arm import Unreachable
 from cell.machines.grippers import GripperModel
 from cell.products.product import Grasp
 from cell.simulation.phase import Guard, Jaw, Outcome, Phase, Sensed, motion_finished
+from planning.motion.timing import JointMotion
 from planning.operations.look import look
 from planning.operations.station import Station
 from planning.operations.waiting import at_rest, steady_jaws
@@ -20,6 +21,7 @@ from planning.operations.waiting import at_rest, steady_jaws
 APPROACH = 0.05  # The jaw comes the last stretch straight along its own z [m] [A].
 CLEARANCE = 0.004  # The jaws open this much wider than the part [m] [A].
 CLEAR = 0.012  # The jaws have left the part when they are this far back [m] [A].
+SHARES = (1.0, 0.75, 0.5)  # Of the way back, tried in this order [A].
 # A jaw that closes this much further than when it gripped holds nothing any more [m].
 LOST = 0.0015
 
@@ -241,12 +243,12 @@ def let_go(
         awake=awake,
     )
     station.put_down()
-    X_WJaw, frame = station.tool_pose(arm, grasp.jaw), arm.frame(grasp.jaw)
+    X_WJaw = station.tool_pose(arm, grasp.jaw)
     for kind, distance, stay in (
         (HandPhase.CLEAR, CLEAR, awake),
         (HandPhase.RETREAT, retreat, frozenset[str]()),
     ):
-        line = station.line(arm, frame, backed_off(X_WJaw, distance))
+        line = _back(station, grasp.jaw, X_WJaw, distance)
         yield Phase(
             kind,
             motion_finished,
@@ -255,6 +257,20 @@ def let_go(
             commands={arm.name: line},
             awake=stay,
         )
+
+
+def _back(station: Station, jaw: str, X_WJaw: RigidTransform, distance: float) -> JointMotion:
+    """Return the motion straight back to a distance from a jaw pose [m].
+
+    Where the other arm is in the way, the hand stops before; it gets clear of the part in any case.
+    """
+    arm = station.holder
+    shorter = [share * distance for share in SHARES if share * distance > CLEAR]
+    for end in (*shorter, CLEAR):
+        line = station.line(arm, arm.frame(jaw), backed_off(X_WJaw, end))
+        if station.clear_of_arms(arm, line):
+            break
+    return line
 
 
 def jaw_to_part(station: Station, part: str, grasp: Grasp) -> RigidTransform:

@@ -18,12 +18,13 @@ from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
 from planning.motion.paths import plan_line, plan_path
 from planning.motion.timing import JointMotion, Pace, SpeedLimit, time_path
-from planning.motion.together import delayed_beside
+from planning.motion.together import delayed_beside, keep_apart
 from planning.operations.planning_copy import collision_model
 from planning.perception.belief import Belief, Source, State
 
 FINE_CLEARANCE = 5e-4  # Kept next to neighbours of a hole; smaller than any gap there [m] [A].
 UNFELT = 0.2  # Share of a force under which it is not taken for that force [A].
+ANY_OVERLAP = -1.0  # As a clearance: parts and surroundings are not checked [m].
 FIXTURE = "jig_base"  # The model instance that carries the fixture.
 SAVED = "station/"  # Before the names in a saved state.
 
@@ -157,12 +158,12 @@ class Station:
                 not be what they are now.
         """
         context, elsewhere = self.context, elsewhere or {}
-        q_jaws = self.cell.plant.GetPositions(context, self.holder.tool_instance)
+        jaws = self.cell.plant.GetPositions(context, self.holder.tool_instance)
         X_HandW = self.tool_pose(self.holder, "tip").inverse()
         others = [name for name in self.belief.estimates if name not in self.in_hand]
         return Surroundings(
             arms={n: elsewhere.get(n, a.positions(context)) for n, a in self.cell.arms.items()},
-            tools={self.hand: elsewhere.get(self.hand, q_jaws)},
+            tools={self.hand: elsewhere.get(self.hand, np.asarray(jaws))},
             X_WP={name: self.pose_of(name) for name in others},
             X_HandP={name: X_HandW @ self.pose_of(name) for name in self.in_hand},
             may_touch=tuple(may_touch),
@@ -285,6 +286,14 @@ class Station:
         limit = SpeedLimit(frame, motion.tool_speed if speed is None else speed)
         throw = np.inf if felt is None else UNFELT * felt
         return self._timed(arm, path, min(throw, motion.wrist_force), limit)
+
+    def clear_of_arms(self, arm: Arm, motion: JointMotion) -> bool:
+        """Return whether a motion keeps the arm's clearance to the others, which stand still.
+
+        Nothing else is checked: a straight line begins or ends beside parts.
+        """
+        self.model.arrange(self.surroundings(clearance=ANY_OVERLAP))
+        return keep_apart(self.model, {arm.name: motion})
 
     def _timed(
         self, arm: Arm, path: JointPath, wrist_force: float, tool_limit: SpeedLimit | None = None

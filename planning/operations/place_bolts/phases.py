@@ -26,6 +26,7 @@ from planning.operations.grasping import (
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.waiting import steady_wrist
 
 LOOK_TIME = 0.05  # The bolt comes to rest in the tray [s] [A].
 LIFT = 0.06
@@ -33,7 +34,7 @@ CLEAR_ABOVE = 0.045  # Transfers end this far above where the bolt will stand [m
 ABOVE = 0.012  # The bolt is looked at once more this far above, its tip over the hole [m] [A].
 ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
 TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
-SLOW = 0.04  # [m/s] [A]
+SLOW = 0.04  # At most, down to the seat [m/s] [A].
 RETREAT = 0.05
 
 
@@ -46,6 +47,7 @@ class BoltPhase(Enum):
     COME_DOWN = "come down"
     LOOK_LOW = "look at the hole"
     ALIGN = "align"
+    HOVER = "hover"
     LOOK_IN = "look in the hole"
     LOWER = "lower"
 
@@ -101,6 +103,10 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
             guard=holding,
             awake=held,
         )
+    # The wrist is tared at rest.
+    yield Phase(
+        BoltPhase.HOVER, steady_wrist(arm.name), 1.0, subject=bolt, guard=holding, awake=held
+    )
     # The parts on the fixture that a bolt at its hole can touch.
     screw = station.cell.product.screws[bolt]
     awake = held | {screw.into, screw.clamps} & frozenset(station.fixed)

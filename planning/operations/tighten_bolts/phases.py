@@ -33,7 +33,6 @@ from planning.operations.grasping import backed_off, let_go, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
-from planning.operations.waiting import at_rest
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
@@ -186,12 +185,11 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     yield from look(station, DrivePhase.LOOK_AT_HEAD, bolt, [bolt], awake=_awake(station))
     R_WE = station.tool_pose(driver, "tool_tip").rotation()
     X_WE = RigidTransform(R_WE, _socket_pose(station, bolt).translation())
-    arrived = at_rest(driver.name)
     outcome = yield Phase(
         DrivePhase.BIT_IN,
         # That the hex has dropped into the socket is told by the model of the joint between them,
         # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
-        lambda sensed: arrived(sensed) and threads.bit_engaged(root, bolt),
+        lambda sensed: sensed.finished and threads.bit_engaged(root, bolt),
         timeout=5.0,
         subject=bolt,
         commands={
