@@ -19,7 +19,8 @@ from planning.operations.pick_place import PICK_PLACE
 from planning.operations.place_bolts import PLACE_BOLTS
 from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 
-LINKED = CellConfig().with_changes({"simulation.contact": "linked"})
+LINKED = CellConfig()
+FULL = LINKED.with_changes({"simulation.contact": "full"})
 PRODUCT = load_product("motor_unit")
 
 
@@ -42,7 +43,7 @@ def test_operations_that_allow_it_are_stepped_coarsely(running: RunningCell) -> 
 
 
 def test_full_contact_is_never_stepped_coarsely() -> None:
-    running = RunningCell(PRODUCT, CellConfig(), seed=0)
+    running = RunningCell(PRODUCT, FULL, seed=0)
     before = running.simulation
     running.go_on(PLACE_BOLTS)
     assert running.simulation is before
@@ -74,8 +75,7 @@ def test_course_and_knowledge_go_on(running: RunningCell) -> None:
 
 def test_frozen_bed_goes_on_holding() -> None:
     """Its link is given back, for its springs are made for a step, and is made anew."""
-    config = QUICK.with_changes({"simulation.contact": "linked"})
-    product = small_product("motor")
+    config, product = QUICK, small_product("motor")
     source = play_ours(build_cell(config, product), JIG_STORY, 440)
     coarse = config.with_changes({"simulation.time_step": config.simulation.coarse_time_step})
     target = Simulation(build_cell(coarse, product))

@@ -8,7 +8,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.configuration.config import CellConfig
 from cell.products.loading import load_product
-from experiments.assembly.prepare import running_cell
+from experiments.assembly.prepare import RunningCell
 from planning.motion.paths import NoPath
 from planning.motion.together import keep_apart
 from planning.operations.station import Station
@@ -18,7 +18,7 @@ DOWN = RollPitchYaw(np.pi, 0.0, 0.0)
 
 @pytest.fixture(scope="module")
 def station() -> Station:
-    return running_cell(load_product("motor_unit"), CellConfig(), 0)[1]
+    return RunningCell(load_product("motor_unit"), CellConfig(), 0).station
 
 
 def over_jig(station: Station, arm: str, height: float) -> np.ndarray:
@@ -57,7 +57,7 @@ def test_jaws_that_are_about_to_open_count_as_open(station: Station) -> None:
 
 def test_straight_lines_are_checked_against_the_other_arm_only() -> None:
     """Into the jig's base it goes, for a line ends at what it is about; not into the driver."""
-    station = running_cell(load_product("motor_unit"), CellConfig(), 0)[1]
+    station = RunningCell(load_product("motor_unit"), CellConfig(), 0).station
     holder, driver, tip = station.holder, station.driver, station.holder.frame("tip")
     x, y, z = station.cell.X_WJ.translation()
     station.cell.plant.SetPositions(
