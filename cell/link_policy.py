@@ -18,7 +18,8 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
-from cell.contact.links import ContactLinks, Mating
+from cell.contact.links import ContactLinks
+from cell.contact.memory import Mating
 from cell.contact.plant_side import Pair
 from cell.fixtures.base import Fixture
 from cell.machines.gripper import Gripper

@@ -26,7 +26,8 @@ from pydrake.systems.framework import Context, DiagramBuilder
 from stories import JIG_STORY, QUICK, Player, small_product
 
 from cell import Cell, build_cell
-from cell.contact.links import ContactLinks, Mating
+from cell.contact.links import ContactLinks
+from cell.contact.memory import Mating
 from cell.contact.plant_side import Pair
 from cell.contact.polygons import Polygons
 from cell.contact.springs import Springs, line_wrenches, stiffness_matrix

@@ -81,7 +81,7 @@ def test_frozen_bed_goes_on_holding() -> None:
     target = Simulation(build_cell(coarse, product))
     links = source.cell.links.memory(source.root)
     assert links.installed
-    linked = links.linked
+    (linked,) = links.linked.values()
     hand_over(source, target)
     assert not target.cell.links.memory(target.root).installed
     assert isinstance(target.cell.fixture, SoftJig)
@@ -94,7 +94,8 @@ def test_frozen_bed_goes_on_holding() -> None:
     memory = target.cell.links.memory(target.root)
     assert memory.installed
     assert memory.time == pytest.approx(target.time)
-    assert linked < memory.linked <= target.time
+    (since,) = memory.linked.values()
+    assert linked < since <= target.time
 
 
 def test_what_is_drawn_follows_what_runs(running: RunningCell, tmp_path: Path) -> None:

@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any, Protocol
 
 import numpy as np
@@ -24,10 +24,10 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context, LeafSystem
 
 from cell.contact.link import Link
+from cell.contact.memory import Installed, LinksMemory, Mating
 from cell.contact.plant_side import SPRINGS, Pair, PlantSide
 
 Array = NDArray[np.float64]
-Mating = frozenset[frozenset[str]]  # Names of the two parts of each pair.
 
 LOOK_PERIOD = 0.01  # For contacts that have come to a stand [s] [A].
 CHECK_PERIOD = 0.005  # Of the links [s] [A].
@@ -50,64 +50,6 @@ class Sticking(Protocol):
     def limits(self, root: Context, A: RigidBody, B: RigidBody, normals_W: Array) -> Array:
         """Return the pressure (n,) that their surfaces bear, given normals (n, 3) [Pa]."""
         ...
-
-
-@dataclass(frozen=True)
-class Installed:
-    """A link in the plant.
-
-    Attributes:
-        link: Which one.
-        slots: (6,) numbers of the springs that it uses.
-        hidden: (k, 2) numbers of the geometries of A and B that it has taken out of contact.
-        until: It ends when the policy says something else than this.
-        sleepers: Numbers of those of the two bodies that sleep without contact to the other one:
-            while there is any, the springs are off.
-    """
-
-    link: Link
-    slots: tuple[int, ...]
-    hidden: Array
-    until: object
-    sleepers: frozenset[int] = frozenset()
-
-
-@dataclass
-class LinksMemory:
-    """What is remembered of links in a Context.
-
-    Attributes:
-        installed: By pair of bodies.
-        watched: Contacts that may be linked: relative pose (3, 4) and step since when it holds.
-        returns: How often each pair has got its full contact back by a check.
-        mating: Pairs of parts whose contact stays full.
-        steps: Since the beginning.
-        time: Since the beginning [s].
-        linked: Integral over time of the number of links [s].
-        made: Links made so far.
-        ended: By reason, links that ended.
-    """
-
-    installed: dict[Pair, Installed] = field(default_factory=dict)
-    watched: dict[Pair, tuple[Array, int]] = field(default_factory=dict)
-    returns: dict[Pair, int] = field(default_factory=dict)
-    mating: Mating = frozenset()
-    steps: int = 0
-    time: float = 0.0
-    linked: float = 0.0
-    made: int = 0
-    ended: Counter[str] = field(default_factory=Counter)
-
-    def __deepcopy__(self, memo: dict[int, Any]) -> LinksMemory:
-        """Copy what is changed in place."""
-        installed = {p: replace(own, link=replace(own.link)) for p, own in self.installed.items()}
-        return replace(
-            self,
-            installed=installed,
-            watched=dict(self.watched),
-            returns=dict(self.returns),
-            ended=Counter(self.ended),
-        )
 
 
 class ContactLinks(LeafSystem):
@@ -211,10 +153,24 @@ class ContactLinks(LeafSystem):
             yield (B, -on_A) if A.index() == body.index() else (A, on_A)
 
     def summary(self, root: Context) -> dict[str, Any]:
-        """Return mean number of links, how many were made, and how many ended, by reason."""
-        memory = self.memory(root)
-        mean = memory.linked / memory.time if memory.time else 0.0
-        return {"mean": mean, "made": memory.made, "ended": dict(sorted(memory.ended.items()))}
+        """Return what became of the links so far.
+
+        Their mean number, how many were made, and how many ended, by reason; and for each pair of
+        bodies the share of the time in which it was linked, and how often a check has given its
+        contact back.
+        """
+        memory, name = self.memory(root), self._side.name
+        shares = {name(pair): time / memory.time for pair, time in memory.linked.items()}
+        returns = {name(pair): count for pair, count in memory.returns.items()}
+        return {
+            "mean": sum(shares.values()),
+            "made": memory.made,
+            "ended": dict(sorted(memory.ended.items())),
+            "pairs": [
+                {"pair": pair, "share_of_time": share, "returns": returns.get(pair, 0)}
+                for pair, share in sorted(shares.items())
+            ],
+        }
 
     # Simulation.
 
@@ -225,7 +181,8 @@ class ContactLinks(LeafSystem):
         memory = self._changed(root)
         memory.steps += 1
         memory.time += dt
-        memory.linked += dt * len(memory.installed)
+        for pair in memory.installed:
+            memory.linked[pair] = memory.linked.get(pair, 0.0) + dt
         self._end_unwanted(root)
         self._check(root, due=memory.steps % max(1, round(CHECK_PERIOD / dt)) == 0)
         if memory.steps % max(1, round(LOOK_PERIOD / dt)) == 0:
@@ -349,7 +306,8 @@ class ContactLinks(LeafSystem):
             "returns": {name(pair): np.array(count) for pair, count in memory.returns.items()},
             "mating": np.array(sorted("|".join(sorted(pair)) for pair in memory.mating), dtype=str),
             "counts": np.array([memory.steps, memory.made]),
-            "times": np.array([memory.time, memory.linked]),
+            "time": np.array(memory.time),
+            "linked": {name(pair): np.array(time) for pair, time in memory.linked.items()},
             "ended": {reason: np.array(count) for reason, count in memory.ended.items()},
         }
 
@@ -367,7 +325,8 @@ class ContactLinks(LeafSystem):
         memory.returns = {pair_of(name): int(count) for name, count in returns.items()}
         memory.mating = frozenset(frozenset(str(pair).split("|")) for pair in state["mating"])
         memory.steps, memory.made = map(int, state["counts"])
-        memory.time, memory.linked = map(float, state["times"])
+        memory.time = float(state["time"])
+        memory.linked = {pair_of(n): float(time) for n, time in state.get("linked", {}).items()}
         memory.ended = Counter({n: int(count) for n, count in state.get("ended", {}).items()})
         for name, arrays in state.get("links", {}).items():
             pair = pair_of(name)

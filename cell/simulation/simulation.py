@@ -272,6 +272,7 @@ class _PhaseRun:
             **{f"jig_{name}": value for name, value in cell.fixture.reading(root).items()},
             thread_turns=[cell.threads.turns(root, bolt) for bolt in cell.threads],
             clamp_force=[cell.threads[bolt].clamp_force(context) for bolt in cell.threads],
+            links=len(cell.links.memory(root).installed),
         )
 
     def finish(self) -> None:

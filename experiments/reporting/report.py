@@ -17,6 +17,7 @@ PLAN_COLUMNS = ("target", "incoming", "directions", "posture", "fixed_part", "up
 CASE_COLUMNS = (
     "part", "posture", "direction", "meaning", "trials", "successes", "expected", "verdict",
 )  # fmt: skip
+LINK_COLUMNS = ("pair", "share_of_time", "returns")
 OUTCOME_COLUMNS = ("quantity", "outcome", "trials", "mean", "interval", "paper_mean", "welch_p")
 
 
@@ -54,6 +55,7 @@ def write_report(
         section("Who does what when", figures(timeline)),
         section("Plots", figures(plots)),
         section("Measured", _measured(result)),
+        section("Contact links", table(_links(result), LINK_COLUMNS)),
         section("Plan", _plan(plan)),
         section("Versions", pairs(result.get("versions", {}))),
         section("Configuration", settings),
@@ -88,6 +90,11 @@ def _outcomes(result: Mapping[str, Any]) -> list[dict[str, Any]]:
         for outcome, group in groups.items()
         if outcome != "welch_p"
     ]
+
+
+def _links(result: Mapping[str, Any]) -> Sequence[Mapping[str, Any]]:
+    """Return the pairs of bodies that were linked; none where contact was always full."""
+    return result.get("contact_links", {}).get("pairs", ())
 
 
 def _plan(plan: Mapping[str, Any]) -> str:
