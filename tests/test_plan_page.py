@@ -22,6 +22,7 @@ from cell.products.product import Product
 from experiments.plan import page
 from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
 from experiments.plan.command import save_matrices
+from experiments.plan.drawn import Body, DrawnProduct, Shape
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
@@ -37,7 +38,7 @@ SETUP = FixtureSetup.of(CellConfig())
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
 
 
-def boxes_overlap(a: trimesh.Trimesh, b: trimesh.Trimesh) -> bool:
+def boxes_overlap(a: Body, b: Body) -> bool:
     return bool(np.all(a.bounds[0] < b.bounds[1]) and np.all(b.bounds[0] < a.bounds[1]))
 
 
@@ -62,20 +63,20 @@ def test_what_is_fixed_stands_on_the_bag_and_the_rest_comes_from_above(up):
     """The same step seen upright and with the roles exchanged: the peg below, the block above."""
     product = replace(peg_in_hole(), up=up)
     fixing = plan(product, ("block", "peg"))
-    shown = step_arrangement(product, fixing.steps[0], BAG, depth=0.01)
-    parts = {item.name: item.mesh for item in shown if item.name}
+    shown = step_arrangement(DrawnProduct.of(product), fixing.steps[0], BAG, depth=0.01)
+    parts = {item.name: item.body for item in shown if item.name}
     below, above = ("block", "peg") if up == "+z" else ("peg", "block")
     assert parts[below].bounds[0, 2] == pytest.approx(BAG.cap_height - 0.01)
     assert parts[above].bounds[0, 2] > parts[below].bounds[1, 2]
-    (pointer,) = (item.mesh for item in shown if item.color == ARROW)
+    (pointer,) = (item.body for item in shown if item.color == ARROW)
     widths = np.ptp(pointer.vertices[pointer.vertices[:, 2] < pointer.bounds[0, 2] + 1e-6], axis=0)
     assert np.allclose(widths, 0.0, atol=1e-9)  # It ends in its tip, below: it points down.
 
 
 def test_arrow_points_along_its_direction():
-    body = [trimesh.creation.box((0.02, 0.02, 0.02))]
+    body = [Body(Shape(trimesh.creation.box((0.02, 0.02, 0.02))))]
     for along in np.vstack([np.eye(3), -np.eye(3)]):
-        pointer = arrow(body, along)
+        pointer = Body(Shape(arrow(body, along)))
         ahead = pointer.vertices @ along
         tip = pointer.vertices[ahead > ahead.max() - 1e-9]
         np.testing.assert_allclose(np.ptp(tip, axis=0), 0.0, atol=1e-9)
@@ -85,15 +86,15 @@ def test_arrow_points_along_its_direction():
 @pytest.mark.parametrize("make", [peg_in_hole, stack_of_three, tube_and_pins])
 def test_exploded_parts_are_apart(make):
     product = make()
-    shown = exploded(product, plan(product).steps)
-    meshes = [item.mesh for item in shown]
+    shown = exploded(DrawnProduct.of(product), plan(product).steps)
+    meshes = [item.body for item in shown]
     assert len(meshes) == len(product.parts)
     assert not any(boxes_overlap(a, b) for k, a in enumerate(meshes) for b in meshes[:k])
 
 
 def test_camera_sees_everything_and_labels_find_it():
     mesh = trimesh.creation.box((0.1, 0.2, 0.3))
-    view = view_of([mesh])
+    view = view_of([Body(Shape(mesh))])
     np.testing.assert_allclose(projected(view, np.zeros(3)), [view.width / 2, view.height / 2])
     pixels = np.array([projected(view, corner) for corner in mesh.vertices])
     assert np.all(pixels > 0) and np.all(pixels < [view.width, view.height])
