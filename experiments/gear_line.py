@@ -2,7 +2,7 @@
 
 Stations in rows on a base plate, nine parts each, all mated from above: a finned housing held by
 four screws, whose threads are drawn as overlaps of nominal and tap drill diameter; in it a bearing,
-a stepped shaft, a helical gear and a knob. A cover on pillars lies over all. Fits are line to line
+a stepped shaft, a gear that meshes with its neighbours, and a knob. A cover on pillars lies over all. Fits are line to line
 with facets that do not match, and curved surfaces are finer than any tolerance needs.
 """
 
@@ -14,7 +14,8 @@ import numpy as np
 from manifold3d import CrossSection, JoinType, Manifold, OpType
 
 PITCH = 70.0  # [mm] Of the stations.
-TEETH, ADDENDUM, RADIUS = 36, 1.6, 28.0  # Of a gear; lengths in mm.
+TEETH, ADDENDUM, RADIUS = 48, 1.8, 35.0  # Of a gear; lengths in mm.
+BACKLASH = 0.3  # Of a tooth's height: leaves 0.2 mm between the flanks of two gears.
 CORNERS = [(x, y, 0.0) for x in (-24.0, 24.0) for y in (-24.0, 24.0)]  # Of a station's screws.
 
 
@@ -32,7 +33,7 @@ def gear_line(stations: int, fineness: float = 1.0, overlap: float = 0.0) -> dic
     drilled: list[Manifold] = []
     for number in range(stations):
         place = [PITCH * (number % side), PITCH * (number // side), 0]
-        for name, shape in _station(fineness).items():
+        for name, shape in _station(fineness, (number % side + number // side) % 2).items():
             parts[f"{name}_{number + 1}"] = shape.translate(place)
         drilled += [_rod(2.1, -12, 1, 32).translate(place).translate(at) for at in CORNERS]
     last = f"gear_{stations}"
@@ -46,8 +47,11 @@ def gear_line(stations: int, fineness: float = 1.0, overlap: float = 0.0) -> dic
     return {"base": base - _union(drilled), **parts, **pillars, "cover": cover}
 
 
-def _station(fineness: float) -> dict[str, Manifold]:
-    """Return housing, bearing, shaft, gear, knob and four screws of one station."""
+def _station(fineness: float, gap: int) -> dict[str, Manifold]:
+    """Return housing, bearing, shaft, gear, knob and four screws of one station.
+
+    The gear has a tooth towards its neighbours, or, where ``gap`` is 1, a gap.
+    """
     seats = [_half(5, 9, 18), _half(7, 18, 34), _half(5, 34, 48), _half(4, 48, 60)]
     turn = round(100 * fineness)  # Facets.
     ring = CrossSection.square([5, 10]).translate([5, 8])
@@ -55,7 +59,7 @@ def _station(fineness: float) -> dict[str, Manifold]:
         "housing": _housing(fineness),
         "bearing": _turned(_rounded(ring, 0.8, turn // 3), turn),
         "shaft": _turned(_rounded(_merged(seats), 0.4, turn // 3), turn + 40),
-        "gear": _gear(fineness),
+        "gear": _gear(fineness).rotate([0, 0, gap * 180 / TEETH]),
         "knob": _knob(turn),
     }
     head = _rounded(_half(4.25, 5, 10), 1.5, turn // 2)
@@ -78,12 +82,12 @@ def _housing(fineness: float) -> Manifold:
 
 
 def _gear(fineness: float) -> Manifold:
-    """A helical gear with a bore, which lies on the shaft's shoulder."""
+    """A spur gear with a bore, which lies on the shaft's shoulder; its flanks are in layers."""
     points = round(18 * fineness)  # Of a tooth's outline.
     angles = np.linspace(0, 2 * np.pi, TEETH * points, endpoint=False)
-    radii = RADIUS + ADDENDUM * np.clip(1.6 * np.cos(TEETH * angles), -1, 1)
+    radii = RADIUS + ADDENDUM * np.clip(1.6 * np.cos(TEETH * angles) - BACKLASH, -1, 0.9)
     outline = CrossSection([np.c_[radii * np.cos(angles), radii * np.sin(angles)]])
-    teeth = Manifold.extrude(outline, 14, round(10 * fineness), 20.0).translate([0, 0, 34])
+    teeth = Manifold.extrude(outline, 14, round(6 * fineness)).translate([0, 0, 34])
     return teeth - _rod(5, 33, 49, round(110 * fineness))
 
 

@@ -24,6 +24,9 @@ from planning.feasibility.solids import solid_of
 SHOWN = 1.0 / 1000.0
 """[D] Of the product's size: half a pixel, as a picture is 560 of them high."""
 
+SHOWN_ALONE = 1.0 / 200.0
+"""[A] Of a part's own size: early steps show a few small parts, large."""
+
 
 @dataclass(frozen=True, eq=False)
 class Shape:
@@ -74,7 +77,7 @@ class DrawnProduct:
 
     @staticmethod
     def of(product: Product) -> DrawnProduct:
-        """Simplify all parts to what a picture of the whole product shows."""
+        """Simplify all parts to what a picture of the whole product, or of one part, shows."""
         parts = product.parts
         corners = np.concatenate(
             [part.X_AP.multiply(part.mesh.bounds.T).T for part in parts.values()]
@@ -87,6 +90,7 @@ class DrawnProduct:
 def _simplified(part: Part, deviation: float) -> trimesh.Trimesh:
     """Return a part in its assembled pose, its surface moved by less than a deviation [m]."""
     solid = solid_of(part)
+    deviation = min(deviation, SHOWN_ALONE * float(np.max(solid.upper - solid.lower)))
     try:
         coarse = solid.manifold.simplify(deviation).to_mesh64()
     except BadPart:  # A surface that only the renderer can use is drawn as it is.

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planning.feasibility.cells import crossing_pairs, touching
 from planning.feasibility.clipping import Polygons, triangle_overlaps
 from planning.feasibility.envelope import Faces
 
@@ -107,6 +108,17 @@ def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
     return paired(a, b, d[row], u[column])
 
 
+def faces_about(down: Faces, up: Faces, point: np.ndarray, reach: float) -> FacePairs:
+    """Return all pairs of faces, one of each, that come near a point (2,) of the plane [m]."""
+    d, u = (
+        np.flatnonzero(
+            touching(faces, np.arange(len(faces.low)), (point - reach)[None], (point + reach)[None])
+        )
+        for faces in (down, up)
+    )
+    return paired(down, up, np.repeat(d, len(u)), np.tile(u, len(d)))
+
+
 def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     """Return the pairs of faces that can hit each other.
 
@@ -118,9 +130,12 @@ def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     d, u = _near(down, up, height), _near(up, down, height)
     if not len(d) or not len(u):
         return paired(down, up, d[:0], u[:0])
-    boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
-    row, column = box_pairs(*boxes)
-    d, u = d[row], u[column]
+    if len(d) * len(u) > DENSE:
+        d, u = crossing_pairs(down, up, d, u, height)
+    else:
+        boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
+        row, column = box_pairs(*boxes)
+        d, u = d[row], u[column]
     chosen = up.high[u, 2] > down.low[d, 2] + height
     d, u = d[chosen], u[chosen]
     pairs = paired(down, up, d, u)
