@@ -97,9 +97,8 @@ def _probed(
         if (i, k) in known or len(down.low) * len(up.low) <= DENSE:
             continue
         for probe in _deepest_probes(down, up, tolerance):
-            around = faces_about(down, up, probe, NEAR * tolerance)
-            regions = _clipped({(i, k): around}, tolerance)[i, k]
-            point = _wide_point([regions], tolerance)
+            around = blocked_regions([faces_about(down, up, probe, NEAR * tolerance)], tolerance)
+            point = point_in_wide_union([around.within(probe, NEAR * tolerance)], tolerance)
             if point is not None:
                 hits[i, k] = point
                 break

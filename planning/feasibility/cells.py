@@ -62,7 +62,7 @@ class _Members:
         cell = (4 * self.cell[:, None] + np.arange(4)).ravel()
         which = np.repeat(self.which, 4)
         corner = (low[self.cell][:, None] + QUARTERS * size).reshape(-1, 2)
-        inside = np.flatnonzero(touching(self.faces, which, corner, corner + size))
+        inside = np.flatnonzero(touching(self.faces.chosen(which), corner, corner + size))
         inside = inside[np.argsort(cell[inside], kind="stable")]
         return _Members(self.faces, which[inside], cell[inside])
 
@@ -70,21 +70,19 @@ class _Members:
 QUARTERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
-def touching(faces: Faces, which: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Return whether faces reach into rectangles, one of each (n,), seen along the axis.
+def touching(faces: Faces, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """Return whether faces reach into rectangles, seen along the axis, (n,) bool.
 
     Args:
-        faces: Of one part.
-        which: (n,) indices of faces.
-        low, high: (n, 2) corners of the rectangles [m], or (1, 2) of one for all.
+        faces: n faces.
+        low, high: (n, 2) corners of a rectangle for each [m], or (1, 2) of one for all.
     """
-    inside = (faces.low[which, :2] <= high + ROUNDING) & (faces.high[which, :2] >= low - ROUNDING)
+    inside = (faces.low[:, :2] <= high + ROUNDING) & (faces.high[:, :2] >= low - ROUNDING)
     meets = inside[:, 0] & inside[:, 1]
     rows = np.flatnonzero(meets)
-    corners = faces.corners[which[rows]]
+    low, high = (np.broadcast_to(c, (len(meets), 2))[rows] for c in (low, high))
+    corners = faces.corners[rows]
     middle, half = (low + high) / 2, (high - low) / 2 + ROUNDING
-    if len(middle) > 1:
-        middle, half = middle[rows], half[rows]
     apart = np.zeros(len(rows), bool)
     for k in range(3):
         start, along = corners[:, k], corners[:, (k + 1) % 3] - corners[:, k]

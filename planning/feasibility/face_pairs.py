@@ -19,6 +19,7 @@ from planning.feasibility.envelope import Faces
 
 DENSE = 400_000  # Up to this many pairs, comparing all with all is faster than a grid.
 ON_EDGE = 1e-12  # [m] A point on the edge of a face's box counts as inside.
+OUTERMOST = 48  # Faces of each part about a point: more than lie within a few tolerances of it.
 FIRST_ROW, FIRST_COLUMN = 1, 2
 CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
 
@@ -109,14 +110,19 @@ def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
 
 
 def faces_about(down: Faces, up: Faces, point: np.ndarray, reach: float) -> FacePairs:
-    """Return all pairs of faces, one of each, that come near a point (2,) of the plane [m]."""
-    d, u = (
-        np.flatnonzero(
-            touching(faces, np.arange(len(faces.low)), (point - reach)[None], (point + reach)[None])
-        )
-        for faces in (down, up)
-    )
+    """Return the pairs of the lowest down-faces and the highest up-faces near a point (2,) [m].
+
+    The faces below them, as of the turns of a thread, only cover the same regions once more.
+    """
+    d, u = (_outermost(faces, point, reach) for faces in (down, up))
     return paired(down, up, np.repeat(d, len(u)), np.tile(u, len(d)))
+
+
+def _outermost(faces: Faces, point: np.ndarray, reach: float) -> np.ndarray:
+    near = np.flatnonzero(touching(faces, (point - reach)[None], (point + reach)[None]))
+    heights = faces.planes[near, :2] @ point + faces.planes[near, 2]
+    heights = np.clip(heights, faces.low[near, 2], faces.high[near, 2])
+    return near[np.argsort(-faces.facing * heights, kind="stable")[:OUTERMOST]]
 
 
 def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
