@@ -2,8 +2,9 @@
 
 Stations in rows on a base plate, nine parts each, all mated from above: a finned housing held by
 four screws, whose threads are drawn as overlaps of nominal and tap drill diameter; in it a bearing,
-a stepped shaft, a gear that meshes with its neighbours, and a knob. A cover on pillars lies over all. Fits are line to line
-with facets that do not match, and curved surfaces are finer than any tolerance needs.
+a stepped shaft, a gear that meshes with its neighbours, and a knob. A cover on pillars lies over
+all. Fits are line to line with facets that do not match, and curved surfaces are finer than any
+tolerance needs.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from manifold3d import CrossSection, JoinType, Manifold, OpType
 
 PITCH = 70.0  # [mm] Of the stations.
 TEETH, ADDENDUM, RADIUS = 48, 1.8, 35.0  # Of a gear; lengths in mm.
-BACKLASH = 0.3  # Of a tooth's height: leaves 0.2 mm between the flanks of two gears.
+BACKLASH = 0.3  # Of a tooth's height: leaves 0.17 mm between two gears [M].
 CORNERS = [(x, y, 0.0) for x in (-24.0, 24.0) for y in (-24.0, 24.0)]  # Of a station's screws.
 
 
@@ -25,7 +26,7 @@ def gear_line(stations: int, fineness: float = 1.0, overlap: float = 0.0) -> dic
     Args:
         stations: Number of stations; the machine has 9 parts for each, and 4 more.
         fineness: Facets per turn grow with it, and triangles with its square.
-        overlap: By how much the last gear is driven into the shoulder of its shaft [mm].
+        overlap: By how much the cover is driven into its pillars [mm].
     """
     side = int(np.ceil(np.sqrt(stations)))
     low, width = -PITCH / 2, side * PITCH
@@ -36,10 +37,8 @@ def gear_line(stations: int, fineness: float = 1.0, overlap: float = 0.0) -> dic
         for name, shape in _station(fineness, (number % side + number // side) % 2).items():
             parts[f"{name}_{number + 1}"] = shape.translate(place)
         drilled += [_rod(2.1, -12, 1, 32).translate(place).translate(at) for at in CORNERS]
-    last = f"gear_{stations}"
-    parts[last] = parts[last].translate([0, 0, -overlap])
     base = Manifold.cube([width, width, 20]).translate([low, low, -20])
-    cover = Manifold.cube([width, width, 6]).translate([low, low, 90])
+    cover = Manifold.cube([width, width, 6]).translate([low, low, 90 - overlap])
     pillars = {
         f"pillar_{k + 1}": _rod(2, 0, 90, 64).translate([x, low + 2.5, 0])
         for k, x in enumerate((low + 2.5, low + width - 2.5))
@@ -48,25 +47,22 @@ def gear_line(stations: int, fineness: float = 1.0, overlap: float = 0.0) -> dic
 
 
 def _station(fineness: float, gap: int) -> dict[str, Manifold]:
-    """Return housing, bearing, shaft, gear, knob and four screws of one station.
+    """Return the parts of one station in the order in which they are assembled.
 
     The gear has a tooth towards its neighbours, or, where ``gap`` is 1, a gap.
     """
     seats = [_half(5, 9, 18), _half(7, 18, 34), _half(5, 34, 48), _half(4, 48, 60)]
     turn = round(100 * fineness)  # Facets.
     ring = CrossSection.square([5, 10]).translate([5, 8])
-    parts = {
+    head = _rounded(_half(4.25, 5, 10), 1.5, turn // 2)
+    screw = _turned(_merged([_half(2.5, -10, 5.5), head]), round(64 * fineness)) - _rod(2, 7, 11, 6)
+    return {
         "housing": _housing(fineness),
+        **{f"screw_{k + 1}": screw.translate(at) for k, at in enumerate(CORNERS)},
         "bearing": _turned(_rounded(ring, 0.8, turn // 3), turn),
         "shaft": _turned(_rounded(_merged(seats), 0.4, turn // 3), turn + 40),
         "gear": _gear(fineness).rotate([0, 0, gap * 180 / TEETH]),
         "knob": _knob(turn),
-    }
-    head = _rounded(_half(4.25, 5, 10), 1.5, turn // 2)
-    screw = _turned(_merged([_half(2.5, -10, 5.5), head]), round(64 * fineness))
-    socket = _rod(2, 7, 11, 6)
-    return parts | {
-        f"screw_{k + 1}": (screw - socket).translate(at) for k, at in enumerate(CORNERS)
     }
 
 

@@ -12,17 +12,19 @@ import numpy as np
 import pytest
 import trimesh
 from matplotlib.image import imread
+from pydrake.math import RigidTransform
 from test_report import Outline
 from tiny_products import interlocked_links, peg_in_hole, stack_of_three, tube_and_pins
 
 from cell import CellConfig
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.loading import load_product
-from cell.products.product import Product
-from experiments.plan import page
-from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
+from cell.products.mesh_io import obj_text
+from cell.products.product import Part, Product
+from experiments.plan import drawn, page
+from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, jig, step_arrangement
 from experiments.plan.command import save_matrices
-from experiments.plan.drawn import Body, DrawnProduct, Shape
+from experiments.plan.drawn import SHOWN, Body, DrawnProduct, Shape
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
@@ -188,3 +190,28 @@ def test_the_papers_remark_on_bolts_depends_on_the_side_of_the_foot():
         assert (remark.part, remark.bolts, remark.holds) == ("plate", 6, holds)
         assert ("does not hold" not in remark.text()) == holds
         print(remark.text())
+
+
+def test_drawn_parts_are_coarse_and_close():
+    """A ball of 20 000 triangles loses most of them, and moves by less than half a pixel."""
+    ball = trimesh.creation.icosphere(5, 0.01)
+    product = Product("ball", {"ball": Part("ball", ball, 1.0, RigidTransform([0.1, 0, 0]))})
+    (shape,) = DrawnProduct.of(product).shapes.values()
+    assert len(shape.mesh.faces) < len(ball.faces) / 3 and shape.mesh.is_watertight
+    radii = np.linalg.norm(shape.mesh.triangles_center - [0.1, 0, 0], axis=1)
+    assert radii.min() > 0.01 - 1.1 * SHOWN * np.linalg.norm(ball.extents)
+
+
+@needs_rendering
+def test_parts_are_made_ready_once_for_all_pictures(monkeypatch, tmp_path):
+    """Three parts in three pictures, bag and base in two: each is converted once."""
+    converted: list[int] = []
+
+    def counted(mesh: trimesh.Trimesh, normals: bool = False) -> str:
+        converted.append(len(mesh.faces))
+        return obj_text(mesh, normals=normals)
+
+    monkeypatch.setattr(drawn, "obj_text", counted)
+    jig.cache_clear()
+    write(stack_of_three(), tmp_path / "plan.html")
+    assert len(converted) == 3 + 2 + 2  # Parts, bag and base, an arrow per step.

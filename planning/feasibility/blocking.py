@@ -41,6 +41,7 @@ FIRST = 32  # Widest pairs of faces of two parts that the third round clips firs
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
+ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
 SEEDS, NEAR = 4, 4.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
 
@@ -97,8 +98,8 @@ def _probed(
         if (i, k) in known or len(down.low) * len(up.low) <= DENSE:
             continue
         for probe in _deepest_probes(down, up, tolerance):
-            around = blocked_regions([faces_about(down, up, probe, NEAR * tolerance)], tolerance)
-            point = point_in_wide_union([around.within(probe, NEAR * tolerance)], tolerance)
+            around = blocked_regions([faces_about(down, up, probe, ABOUT * tolerance)], tolerance)
+            point = point_in_wide_union([around.within(probe, ABOUT * tolerance)], tolerance)
             if point is not None:
                 hits[i, k] = point
                 break

@@ -62,7 +62,7 @@ class _Members:
         cell = (4 * self.cell[:, None] + np.arange(4)).ravel()
         which = np.repeat(self.which, 4)
         corner = (low[self.cell][:, None] + QUARTERS * size).reshape(-1, 2)
-        inside = np.flatnonzero(touching(self.faces.chosen(which), corner, corner + size))
+        inside = np.flatnonzero(touching(self.faces, which, corner, corner + size))
         inside = inside[np.argsort(cell[inside], kind="stable")]
         return _Members(self.faces, which[inside], cell[inside])
 
@@ -70,18 +70,23 @@ class _Members:
 QUARTERS = np.array([[0, 0], [1, 0], [0, 1], [1, 1]])
 
 
-def touching(faces: Faces, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+def touching(faces: Faces, which: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
     """Return whether faces reach into rectangles, seen along the axis, (n,) bool.
 
     Args:
-        faces: n faces.
-        low, high: (n, 2) corners of a rectangle for each [m], or (1, 2) of one for all.
+        faces: Of one part.
+        which: (n,) indices of faces.
+        low: (n, 2) lower corner of a rectangle for each [m], or (1, 2) of one for all.
+        high: Its upper corner.
     """
-    inside = (faces.low[:, :2] <= high + ROUNDING) & (faces.high[:, :2] >= low - ROUNDING)
+    face_low, face_high = faces.low[which, :2], faces.high[which, :2]
+    inside = (face_low <= high + ROUNDING) & (face_high >= low - ROUNDING)
     meets = inside[:, 0] & inside[:, 1]
-    rows = np.flatnonzero(meets)
+    # The box of a face no larger than the rectangle says nearly as much as its edges.
+    large = (face_high - face_low > high - low).any(axis=1)
+    rows = np.flatnonzero(meets & large)
     low, high = (np.broadcast_to(c, (len(meets), 2))[rows] for c in (low, high))
-    corners = faces.corners[rows]
+    corners = faces.corners[which[rows]]
     middle, half = (low + high) / 2, (high - low) / 2 + ROUNDING
     apart = np.zeros(len(rows), bool)
     for k in range(3):
@@ -103,7 +108,8 @@ def crossing_pairs(
     Args:
         down: Faces of the moving part that face against the direction.
         up: Faces of the stationary part that face along it.
-        d, u: Indices of those that count.
+        d: Indices of the down-faces that count.
+        u: Indices of the up-faces that count.
         height: How far an up-face must rise above a down-face [m].
     """
     low = np.maximum(down.low[d, :2].min(axis=0), up.low[u, :2].min(axis=0))[None]

@@ -19,7 +19,7 @@ from planning.feasibility.envelope import Faces
 
 DENSE = 400_000  # Up to this many pairs, comparing all with all is faster than a grid.
 ON_EDGE = 1e-12  # [m] A point on the edge of a face's box counts as inside.
-OUTERMOST = 48  # Faces of each part about a point: more than lie within a few tolerances of it.
+OUTERMOST = 96  # Faces of each part about a point: more than lie within a few tolerances of it.
 FIRST_ROW, FIRST_COLUMN = 1, 2
 CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
 
@@ -119,7 +119,8 @@ def faces_about(down: Faces, up: Faces, point: np.ndarray, reach: float) -> Face
 
 
 def _outermost(faces: Faces, point: np.ndarray, reach: float) -> np.ndarray:
-    near = np.flatnonzero(touching(faces, (point - reach)[None], (point + reach)[None]))
+    every, box = np.arange(len(faces.low)), ((point - reach)[None], (point + reach)[None])
+    near = np.flatnonzero(touching(faces, every, *box))
     heights = faces.planes[near, :2] @ point + faces.planes[near, 2]
     heights = np.clip(heights, faces.low[near, 2], faces.high[near, 2])
     return near[np.argsort(-faces.facing * heights, kind="stable")[:OUTERMOST]]
