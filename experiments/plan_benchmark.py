@@ -30,7 +30,7 @@ from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.products.loading import load_product
 from cell.products.product import Part, Product
-from experiments.gear_line import gear_line
+from experiments.plan.gear_line import gear_line
 from experiments.plan.page import write_page
 from planning.assembly_plan.planner import plan
 from planning.feasibility.cache import cached_matrices

@@ -7,7 +7,7 @@ import pytest
 from tiny_products import product_of
 
 from cell.errors import InputError
-from experiments.gear_line import gear_line
+from experiments.plan.gear_line import gear_line
 from planning import plan
 from planning.feasibility.matrices import matrices_of
 
