@@ -26,7 +26,7 @@ from planning.fixture_analysis.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.advice_format import advice_text, constraint_text
 
-MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
+MOST_STEPS_PICTURED = 30  # A picture takes 0.1 s and 70 kB.
 MOST_BLOCKERS = 400
 
 

@@ -1,9 +1,10 @@
 """Which parts block which others along one axis, with the margin of each decision.
 
-Three rounds, each for the pairs that the previous one left undecided. Bounding boxes find parts
+Four rounds, each for the pairs that the previous one left undecided. Bounding boxes find parts
 that pass each other. The widest faces, for all pairs of parts at once, settle most blocked pairs:
-two large faces in each other's way suffice. All faces that can hit each other decide the rest; only
-regions made of slivers need their union.
+two large faces in each other's way suffice. Finely tessellated parts have no large faces: they are
+looked at over a few probes, about which the outermost faces of both are compared. All faces that
+can hit each other decide the rest; only regions made of slivers need their union.
 
 A decision flips at some critical tolerance, below which the pair is blocked and above which it is
 free. It is computed only where it matters: a pair blocked at 1.5 times the tolerance, or free at

@@ -3,7 +3,8 @@
 A pair counts if the bounding rectangles of the projections overlap and the up-face can lie above
 the down-face somewhere in that overlap. The second test bounds the height difference, a linear
 function, over the rectangle: it discards the faces of two surfaces that lie on each other, of which
-a finely tessellated fit has tens of thousands.
+a finely tessellated fit has tens of thousands. Of parts with many faces, only those that share a
+place (``cells``) are paired.
 """
 
 from __future__ import annotations
