@@ -4,8 +4,9 @@ Products of 5 to 500 parts, CPU seconds after import and without reading files. 
 everything from meshes to C, M_j and their margins, with the overlap check; "contact" is the share
 of the distances; "cached" is the same read from the cache, with its content check. ``--rule`` adds
 the orders, the general rule and the page, ``--profile`` the functions that take longest,
-``--large`` shows 500 parts, 1.6 million triangles and the refusal of an overlap among them, with
-their memory. Set OPENBLAS_NUM_THREADS=1 for strictly one core: a few matrix products may use more.
+``--large`` shows 500 parts, products of 1.6 million triangles and the refusal of an overlap in one,
+with their memory. Set OPENBLAS_NUM_THREADS=1 for strictly one core: a few matrix products may use
+more.
 """
 
 from __future__ import annotations
@@ -21,7 +22,7 @@ from pathlib import Path
 import numpy as np
 import trimesh
 import tyro
-from manifold3d import Manifold, Mesh64, OpType
+from manifold3d import CrossSection, Manifold, Mesh64, OpType
 from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.table import Table
@@ -84,6 +85,17 @@ def freeform(cells: int = 70) -> Product:
     return _product("freeform", shapes)
 
 
+def real_threads() -> Product:
+    """Nine screws in a plate, their threads drawn as helices."""
+    plate = Manifold.cube([60, 60, 12]).translate([-30, -30, 0])
+    screws: dict[str, Manifold] = {}
+    for place in ([x, y, 0.0] for x in (-15.0, 0.0, 15.0) for y in (-15.0, 0.0, 15.0)):
+        plate -= _helix(3.62).translate(place)
+        screw = _helix(3.6) + _rod(12, 12, 16, 96)
+        screws[f"screw_{len(screws) + 1}"] = screw.translate(place)
+    return _product("real_threads", {"plate": plate} | screws)
+
+
 def gears(stations: int, fineness: float, overlap: float = 0.0) -> Product:
     """A machine with some 5000 to 12000 triangles a part; see ``gear_line``."""
     return _product(f"gear_line_{stations}", gear_line(stations, fineness, overlap))
@@ -102,6 +114,7 @@ CASES: dict[str, tuple[Callable[[], Product], float]] = {
 LARGE: dict[str, tuple[Callable[[], Product], float]] = {
     "bench, 125 stations": (lambda: bench(125), 20.0),
     "gear line, 15 stations": (lambda: gears(15, 1.1), 15.0),
+    "real threads": (real_threads, 15.0),
 }
 """The same for products as large as are planned."""
 
@@ -225,6 +238,12 @@ def _layer(level: int, cells: int) -> Manifold:
     )
     faces = np.concatenate([top + above, top[:, ::-1], walls])
     return Manifold(Mesh64(vertices, faces.astype(np.uint64)))
+
+
+def _helix(radius: float) -> Manifold:
+    """A thread 12 long, of pitch 1.25: a circle that is twisted about a point beside its centre."""
+    outline = CrossSection.circle(radius, 96).translate([0.4, 0])
+    return Manifold.extrude(outline, 12, 460, 360 * 12 / 1.25)
 
 
 def _rod(diameter: float, low: float, high: float, facets: int) -> Manifold:
