@@ -3,9 +3,10 @@
 Products of 5 to 500 parts, CPU seconds after import and without reading files. "Matrices" is
 everything from meshes to C, M_j and their margins, with the overlap check; "contact" is the share
 of the distances; "cached" is the same read from the cache, with its content check. ``--rule`` adds
-the orders and the general rule, ``--profile`` the functions that take longest, ``--large`` the 500
-parts with their memory. Set OPENBLAS_NUM_THREADS=1 for strictly one core: a few matrix products may
-use more.
+the orders, the general rule and the page, ``--profile`` the functions that take longest,
+``--large`` shows 500 parts, products of 1.6 million triangles and the refusal of an overlap in one,
+with their memory. Set OPENBLAS_NUM_THREADS=1 for strictly one core: a few matrix products may use
+more.
 """
 
 from __future__ import annotations
@@ -21,14 +22,17 @@ from pathlib import Path
 import numpy as np
 import trimesh
 import tyro
-from manifold3d import Manifold, Mesh64, OpType
+from manifold3d import CrossSection, Manifold, Mesh64, OpType
 from pydrake.math import RigidTransform
 from rich.console import Console
 from rich.table import Table
 
 from cell.configuration.config import CellConfig
+from cell.errors import InputError
 from cell.products.loading import load_product
 from cell.products.product import Part, Product
+from experiments.plan.gear_line import gear_line
+from experiments.plan.page import write_page
 from planning.assembly_plan.planner import plan
 from planning.feasibility.cache import cached_matrices
 from planning.feasibility.contact import gap_matrix
@@ -81,16 +85,39 @@ def freeform(cells: int = 70) -> Product:
     return _product("freeform", shapes)
 
 
+def real_threads() -> Product:
+    """Nine screws in a plate, their threads drawn as helices."""
+    plate = Manifold.cube([60, 60, 12]).translate([-30, -30, 0])
+    screws: dict[str, Manifold] = {}
+    for place in ([x, y, 0.0] for x in (-15.0, 0.0, 15.0) for y in (-15.0, 0.0, 15.0)):
+        plate -= _helix(3.62).translate(place)
+        screw = _helix(3.6) + _rod(12, 12, 16, 96)
+        screws[f"screw_{len(screws) + 1}"] = screw.translate(place)
+    return _product("real_threads", {"plate": plate} | screws)
+
+
+def gears(stations: int, fineness: float, overlap: float = 0.0) -> Product:
+    """A machine with some 5000 to 12000 triangles a part; see ``gear_line``."""
+    return _product(f"gear_line_{stations}", gear_line(stations, fineness, overlap))
+
+
 CASES: dict[str, tuple[Callable[[], Product], float]] = {
     "motor unit": (motor_unit, 0.1),
     "perforated plates": (perforated, 0.15),
     "bench, 5 stations": (lambda: bench(5), 0.3),
     "bench, 25 stations": (lambda: bench(25), 2.0),
     "wavy layers": (freeform, 1.0),
+    "gear line, 7 stations": (lambda: gears(7, 0.87), 6.0),
 }
 """Product and target in CPU seconds, by name."""
 
-LARGE = "bench, 125 stations"
+LARGE: dict[str, tuple[Callable[[], Product], float]] = {
+    "bench, 125 stations": (lambda: bench(125), 20.0),
+    "gear line, 15 stations": (lambda: gears(15, 1.1), 15.0),
+    "real threads": (real_threads, 15.0),
+}
+"""The same for products as large as are planned."""
+
 FUNCTIONS = 15  # Listed in a profile.
 
 
@@ -98,14 +125,14 @@ def main(rule: bool = False, profile: bool = False, large: bool = False) -> None
     """Time every case and print the table.
 
     Args:
-        rule: Also time the search for orders and the general rule.
+        rule: Also time the search for orders, the general rule and the page.
         profile: Also print where the time goes.
-        large: Only the product of 500 parts.
+        large: Only the products of most parts and most triangles.
     """
-    cases = {LARGE: (lambda: bench(125), 20.0)} if large else CASES
+    cases = LARGE if large else CASES
     table = Table(title="CPU seconds of the planner", title_justify="left")
     headings = ["product", "parts", "triangles", "contact", "matrices", "target", "cached"]
-    for heading in headings + (["orders", "general rule"] if rule else []):
+    for heading in headings + (["orders", "general rule", "page"] if rule else []):
         table.add_column(heading, justify="left" if heading == "product" else "right")
     for name, (make, target) in cases.items():
         product = make()
@@ -118,6 +145,8 @@ def main(rule: bool = False, profile: bool = False, large: bool = False) -> None
             print(f"{name}:")
             print_profile(product)
     Console().print(table)
+    if large:
+        print(f"Refusal of an overlap in the gear line: {timed_refusal():.2f} s.")
     most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
     print(f"Largest memory of this process: {most:.0f} MB.")
 
@@ -129,8 +158,8 @@ def print_profile(product: Product) -> None:
     pstats.Stats(profiler).sort_stats("tottime").print_stats(FUNCTIONS)
 
 
-def timed_rule(product: Product) -> tuple[float, float]:
-    """Return CPU seconds for the search of orders, with cached matrices, and the general rule."""
+def timed_rule(product: Product) -> tuple[float, float, float]:
+    """Return CPU seconds for the orders, with cached matrices, the general rule, and the page."""
     config = CellConfig.load()
     with tempfile.TemporaryDirectory() as folder:
         cached_matrices(product, None, Path(folder))
@@ -139,9 +168,23 @@ def timed_rule(product: Product) -> tuple[float, float]:
     assert fixing.matrices is not None
     marks.append(time.process_time())
     setup = FixtureSetup.of(config)
-    general_rule(product, fixing.order, fixing.steps, fixing.matrices, setup)
-    orders, chosen = np.diff([*marks, time.process_time()])
-    return orders, chosen
+    choices = general_rule(product, fixing.order, fixing.steps, fixing.matrices, setup)
+    marks.append(time.process_time())
+    with tempfile.TemporaryDirectory() as folder:
+        write_page(Path(folder) / "plan.html", product, fixing, choices, setup)
+    orders, chosen, page = np.diff([*marks, time.process_time()])
+    return orders, chosen, page
+
+
+def timed_refusal() -> float:
+    """Return CPU seconds until an overlap in the largest product is found."""
+    product = gears(15, 1.1, overlap=0.3)
+    started = time.process_time()
+    try:
+        matrices_of(product)
+    except InputError:
+        return time.process_time() - started
+    raise RuntimeError("the overlap was not found")
 
 
 def timed(product: Product) -> tuple[float, float, float]:
@@ -195,6 +238,12 @@ def _layer(level: int, cells: int) -> Manifold:
     )
     faces = np.concatenate([top + above, top[:, ::-1], walls])
     return Manifold(Mesh64(vertices, faces.astype(np.uint64)))
+
+
+def _helix(radius: float) -> Manifold:
+    """A thread 12 long, of pitch 1.25: a circle that is twisted about a point beside its centre."""
+    outline = CrossSection.circle(radius, 96).translate([0.4, 0])
+    return Manifold.extrude(outline, 12, 460, 360 * 12 / 1.25)
 
 
 def _rod(diameter: float, low: float, high: float, facets: int) -> Manifold:

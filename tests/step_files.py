@@ -74,6 +74,35 @@ class StepFile:
         shell = self.add(f"CLOSED_SHELL('',({','.join(faces)}))")
         return self.add(f"MANIFOLD_SOLID_BREP('',{shell})")
 
+    def rod(self, radius: float, height: float) -> str:
+        """Add a cylinder on the plane z = 0, bounded by true circles."""
+        seam = [np.array([radius, 0.0, z]) for z in (0.0, height)]
+        vertices = [self.add(f"VERTEX_POINT('',{self.point(p)})") for p in seam]
+        rims = []
+        for z, vertex in zip((0.0, height), vertices, strict=True):
+            circle = self.add(f"CIRCLE('',{self.world((0.0, 0.0, z))},{radius:.6E})")
+            rims.append(self.add(f"EDGE_CURVE('',{vertex},{vertex},{circle},.T.)"))
+        line = self._edge(np.array(seam), vertices, 0, 1)
+        down = self.frame((0.0, 0, 0), np.array([0.0, 0, -1]), np.array([1.0, 0, 0]))
+        side = self.add(f"CYLINDRICAL_SURFACE('',{self.world()},{radius:.6E})")
+        bottom, top = (
+            self.add(f"PLANE('',{frame})") for frame in (down, self.world((0, 0, height)))
+        )
+        faces = [
+            self._bounded(side, [(rims[0], "T"), (line, "T"), (rims[1], "F"), (line, "F")]),
+            self._bounded(bottom, [(rims[0], "F")]),
+            self._bounded(top, [(rims[1], "T")]),
+        ]
+        shell = self.add(f"CLOSED_SHELL('',({','.join(faces)}))")
+        return self.add(f"MANIFOLD_SOLID_BREP('',{shell})")
+
+    def _bounded(self, surface: str, edges: Sequence[tuple[str, str]]) -> str:
+        """Add a face with one loop of edges, each along its curve (T) or against it (F)."""
+        sides = [self.add(f"ORIENTED_EDGE('',*,*,{edge},.{turn}.)") for edge, turn in edges]
+        loop = self.add(f"EDGE_LOOP('',({','.join(sides)}))")
+        bound = self.add(f"FACE_OUTER_BOUND('',{loop},.T.)")
+        return self.add(f"ADVANCED_FACE('',({bound}),{surface},.T.)")
+
     def _face(
         self,
         corners: np.ndarray,
@@ -81,20 +110,16 @@ class StepFile:
         edges: dict[tuple[int, int], str],
         triangle: np.ndarray,
     ) -> str:
-        sides = []
+        sides: list[tuple[str, str]] = []
         for a, b in zip(triangle, np.roll(triangle, -1), strict=True):
             key = (min(a, b), max(a, b))
             if key not in edges:
                 edges[key] = self._edge(corners, vertices, *key)
-            turn = ".T." if a < b else ".F."
-            sides.append(self.add(f"ORIENTED_EDGE('',*,*,{edges[key]},{turn})"))
-        loop = self.add(f"EDGE_LOOP('',({','.join(sides)}))")
-        bound = self.add(f"FACE_OUTER_BOUND('',{loop},.T.)")
+            sides.append((edges[key], "T" if a < b else "F"))
         p, q, r = corners[triangle]
         normal = np.cross(q - p, r - p)
         plane = self.frame(p, normal / np.linalg.norm(normal), (q - p) / np.linalg.norm(q - p))
-        surface = self.add(f"PLANE('',{plane})")
-        return self.add(f"ADVANCED_FACE('',({bound}),{surface},.T.)")
+        return self._bounded(self.add(f"PLANE('',{plane})"), sides)
 
     def _edge(self, corners: np.ndarray, vertices: list[str], a: int, b: int) -> str:
         along = corners[b] - corners[a]

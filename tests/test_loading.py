@@ -5,8 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+from step_files import StepFile
 
 from cell.errors import BadOrder, BadPart, InputError, UnknownName
+from cell.products.assembly_io import DEFLECTION, FACET_ANGLE, load_assembly
 from cell.products.loading import load_product, product_names
 from cell.products.mesh_io import MESH_SUFFIXES
 
@@ -239,3 +241,15 @@ def test_malformed_grasp_is_refused(folder: Path) -> None:
     with pytest.raises(InputError, match="grasps.0..closing: the zero vector"):
         load_product(write(folder, good.replace("closing: [1, 0, 0]", "closing: [0, 0, 0]")))
     assert load_product(write(folder, good)).parts["block"].grasps[0].force == 4.0
+
+
+@pytest.mark.parametrize("radius", [0.3, 1.0, 6.0])
+def test_step_is_tessellated_as_finely_as_the_tolerance_asks_for(radius, tmp_path):
+    """The coarser the limits, the fewer the facets: at most about half as far apart as allowed."""
+    file = StepFile()
+    file.product("rod", "ADVANCED_BREP_SHAPE_REPRESENTATION", [file.world(), file.rod(radius, 3.0)])
+    (tmp_path / "rod.step").write_text(file.text())
+    (mesh,) = load_assembly(tmp_path / "rod.step").values()
+    facets = int((np.abs(mesh.vertices[:, 2]) < 1e-9).sum())
+    step = min(FACET_ANGLE, 2.0 * np.arccos(1.0 - DEFLECTION / radius))
+    assert 2.0 * np.pi / step <= facets <= 2.2 * 2.0 * np.pi / step

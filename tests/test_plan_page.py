@@ -12,16 +12,19 @@ import numpy as np
 import pytest
 import trimesh
 from matplotlib.image import imread
+from pydrake.math import RigidTransform
 from test_report import Outline
 from tiny_products import interlocked_links, peg_in_hole, stack_of_three, tube_and_pins
 
 from cell import CellConfig
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.loading import load_product
-from cell.products.product import Product
-from experiments.plan import page
-from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, step_arrangement
+from cell.products.mesh_io import obj_text
+from cell.products.product import Part, Product
+from experiments.plan import drawn, page
+from experiments.plan.arrangement import ARROW, arrow, bag_mesh, exploded, jig, step_arrangement
 from experiments.plan.command import save_matrices
+from experiments.plan.drawn import SHOWN, Body, DrawnProduct, Shape
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
@@ -37,7 +40,7 @@ SETUP = FixtureSetup.of(CellConfig())
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
 
 
-def boxes_overlap(a: trimesh.Trimesh, b: trimesh.Trimesh) -> bool:
+def boxes_overlap(a: Body, b: Body) -> bool:
     return bool(np.all(a.bounds[0] < b.bounds[1]) and np.all(b.bounds[0] < a.bounds[1]))
 
 
@@ -62,20 +65,20 @@ def test_what_is_fixed_stands_on_the_bag_and_the_rest_comes_from_above(up):
     """The same step seen upright and with the roles exchanged: the peg below, the block above."""
     product = replace(peg_in_hole(), up=up)
     fixing = plan(product, ("block", "peg"))
-    shown = step_arrangement(product, fixing.steps[0], BAG, depth=0.01)
-    parts = {item.name: item.mesh for item in shown if item.name}
+    shown = step_arrangement(DrawnProduct.of(product), fixing.steps[0], BAG, depth=0.01)
+    parts = {item.name: item.body for item in shown if item.name}
     below, above = ("block", "peg") if up == "+z" else ("peg", "block")
     assert parts[below].bounds[0, 2] == pytest.approx(BAG.cap_height - 0.01)
     assert parts[above].bounds[0, 2] > parts[below].bounds[1, 2]
-    (pointer,) = (item.mesh for item in shown if item.color == ARROW)
+    (pointer,) = (item.body for item in shown if item.color == ARROW)
     widths = np.ptp(pointer.vertices[pointer.vertices[:, 2] < pointer.bounds[0, 2] + 1e-6], axis=0)
     assert np.allclose(widths, 0.0, atol=1e-9)  # It ends in its tip, below: it points down.
 
 
 def test_arrow_points_along_its_direction():
-    body = [trimesh.creation.box((0.02, 0.02, 0.02))]
+    body = [Body(Shape(trimesh.creation.box((0.02, 0.02, 0.02))))]
     for along in np.vstack([np.eye(3), -np.eye(3)]):
-        pointer = arrow(body, along)
+        pointer = Body(Shape(arrow(body, along)))
         ahead = pointer.vertices @ along
         tip = pointer.vertices[ahead > ahead.max() - 1e-9]
         np.testing.assert_allclose(np.ptp(tip, axis=0), 0.0, atol=1e-9)
@@ -85,15 +88,15 @@ def test_arrow_points_along_its_direction():
 @pytest.mark.parametrize("make", [peg_in_hole, stack_of_three, tube_and_pins])
 def test_exploded_parts_are_apart(make):
     product = make()
-    shown = exploded(product, plan(product).steps)
-    meshes = [item.mesh for item in shown]
+    shown = exploded(DrawnProduct.of(product), plan(product).steps)
+    meshes = [item.body for item in shown]
     assert len(meshes) == len(product.parts)
     assert not any(boxes_overlap(a, b) for k, a in enumerate(meshes) for b in meshes[:k])
 
 
 def test_camera_sees_everything_and_labels_find_it():
     mesh = trimesh.creation.box((0.1, 0.2, 0.3))
-    view = view_of([mesh])
+    view = view_of([Body(Shape(mesh))])
     np.testing.assert_allclose(projected(view, np.zeros(3)), [view.width / 2, view.height / 2])
     pixels = np.array([projected(view, corner) for corner in mesh.vertices])
     assert np.all(pixels > 0) and np.all(pixels < [view.width, view.height])
@@ -187,3 +190,28 @@ def test_the_papers_remark_on_bolts_depends_on_the_side_of_the_foot():
         assert (remark.part, remark.bolts, remark.holds) == ("plate", 6, holds)
         assert ("does not hold" not in remark.text()) == holds
         print(remark.text())
+
+
+def test_drawn_parts_are_coarse_and_close():
+    """A ball of 20 000 triangles loses most of them, and moves by less than half a pixel."""
+    ball = trimesh.creation.icosphere(5, 0.01)
+    product = Product("ball", {"ball": Part("ball", ball, 1.0, RigidTransform([0.1, 0, 0]))})
+    (shape,) = DrawnProduct.of(product).shapes.values()
+    assert len(shape.mesh.faces) < len(ball.faces) / 3 and shape.mesh.is_watertight
+    radii = np.linalg.norm(shape.mesh.triangles_center - [0.1, 0, 0], axis=1)
+    assert radii.min() > 0.01 - 1.1 * SHOWN * np.linalg.norm(ball.extents)
+
+
+@needs_rendering
+def test_parts_are_made_ready_once_for_all_pictures(monkeypatch, tmp_path):
+    """Three parts in three pictures, bag and base in two: each is converted once."""
+    converted: list[int] = []
+
+    def counted(mesh: trimesh.Trimesh, normals: bool = False) -> str:
+        converted.append(len(mesh.faces))
+        return obj_text(mesh, normals=normals)
+
+    monkeypatch.setattr(drawn, "obj_text", counted)
+    jig.cache_clear()
+    write(stack_of_three(), tmp_path / "plan.html")
+    assert len(converted) == 3 + 2 + 2  # Parts, bag and base, an arrow per step.

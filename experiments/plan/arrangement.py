@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 import trimesh
+from pydrake.math import RigidTransform
 
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.product import Product
+from experiments.plan.drawn import Body, DrawnProduct, Shape, box
 from experiments.plan.scene import Color, SceneItem
 from planning.feasibility.algorithm import FixingStep
 from planning.feasibility.directions import opposite, rotation_with_up, unit_vector
@@ -30,81 +33,61 @@ GAP = 0.35  # Of the size of the moved parts, between the parts in a picture.
 
 
 def step_arrangement(
-    product: Product, step: FixingStep, bag: BagParameters, depth: float
+    drawn: DrawnProduct, step: FixingStep, bag: BagParameters, depth: float
 ) -> list[SceneItem]:
     """Return the product in its posture on the jig, and the moved parts with the mating arrow.
 
     Args:
-        product: Its parts.
+        drawn: The product and the shapes of its parts.
         step: Algorithm 1's choice.
         bag: Of the jig.
         depth: Of the fixed body's lowest point below the bag's apex [m].
     """
-    turned = {n: _turned(product, n, step.up) for n in (*step.target, *step.incoming)}
+    turned = {n: _turned(drawn, n, step.up) for n in (*step.target, *step.incoming)}
     below = step.incoming if step.posture == opposite(step.up) else step.target
     moved = step.target if below is step.incoming else step.incoming
     leaving = rotation_with_up(step.up) @ unit_vector(
         step.posture if moved is step.incoming else opposite(step.posture)
     )
-    low, high = _box([turned[name] for name in below])
+    low, high = box(turned[name] for name in below)
     middle = (low + high) / 2
     to_bag = np.array([-middle[0], -middle[1], bag.cap_height - depth - low[2]])
-    for mesh in turned.values():
-        mesh.apply_translation(to_bag)
+    turned = {name: body.moved(to_bag) for name, body in turned.items()}
     start = _separation([turned[n] for n in moved], [turned[n] for n in below], leaving)
-    for name in moved:
-        turned[name].apply_translation(start * leaving)
-    shown = [
-        SceneItem(bag_mesh(bag), BAG, frame=False),
-        SceneItem(base_mesh(bag), BASE, frame=False),
-    ]
-    shown += _parts(product, turned, moved)
-    return [*shown, SceneItem(arrow([turned[n] for n in moved], -leaving), ARROW)]
+    turned |= {name: turned[name].moved(start * leaving) for name in moved}
+    shown = [*jig(bag), *_parts(drawn.product, turned, moved)]
+    pointer = Body(Shape(arrow([turned[n] for n in moved], -leaving)))
+    return [*shown, SceneItem(pointer, ARROW)]
 
 
-def exploded(product: Product, steps: Sequence[FixingStep]) -> list[SceneItem]:
+def exploded(drawn: DrawnProduct, steps: Sequence[FixingStep]) -> list[SceneItem]:
     """Return an exploded view: each item moved out against its mating direction."""
     assembled = list(steps[0].target)
     names = [*assembled, *(name for step in steps for name in step.incoming)]
-    turned = {name: _turned(product, name, steps[0].up) for name in names}
+    turned = {name: _turned(drawn, name, steps[0].up) for name in names}
     for step in steps:
         leaving = rotation_with_up(step.up) @ unit_vector(step.posture)
         moved = [turned[name] for name in step.incoming]
         distance = _separation(moved, [turned[name] for name in assembled], leaving)
-        for mesh in moved:
-            mesh.apply_translation(distance * leaving)
+        turned |= {name: turned[name].moved(distance * leaving) for name in step.incoming}
         assembled += step.incoming
-    return _parts(product, turned, ())
+    return _parts(drawn.product, turned, ())
 
 
-def _turned(product: Product, name: str, up: str) -> trimesh.Trimesh:
+def _turned(drawn: DrawnProduct, name: str, up: str) -> Body:
     """Return a part in its assembled pose, the product turned with ``up`` up."""
-    part = product.parts[name]
-    mesh = trimesh.Trimesh(part.mesh.vertices, part.mesh.faces, process=False)
-    mesh.apply_transform(part.X_AP.GetAsMatrix4())
-    turn = np.eye(4)
-    turn[:3, :3] = rotation_with_up(up).matrix()
-    return mesh.apply_transform(turn)
+    return Body(drawn.shapes[name], RigidTransform(rotation_with_up(up), np.zeros(3)))
 
 
-def _separation(
-    moved: Sequence[trimesh.Trimesh], staying: Sequence[trimesh.Trimesh], along: np.ndarray
-) -> float:
+def _separation(moved: Sequence[Body], staying: Sequence[Body], along: np.ndarray) -> float:
     """Return the distance to move along a direction until there is a gap [m]."""
-    (low, high), (low_there, high_there) = _box(moved), _box(staying)
+    (low, high), (low_there, high_there) = box(moved), box(staying)
     axis, forward = int(np.argmax(np.abs(along))), along.sum() > 0
     overlap = high_there[axis] - low[axis] if forward else high[axis] - low_there[axis]
     return max(0.0, float(overlap)) + GAP * float(np.linalg.norm(high - low))
 
 
-def _box(meshes: Sequence[trimesh.Trimesh]) -> tuple[np.ndarray, np.ndarray]:
-    bounds = np.array([mesh.bounds for mesh in meshes])
-    return bounds[:, 0].min(axis=0), bounds[:, 1].max(axis=0)
-
-
-def _parts(
-    product: Product, turned: dict[str, trimesh.Trimesh], moved: Sequence[str]
-) -> list[SceneItem]:
+def _parts(product: Product, turned: Mapping[str, Body], moved: Sequence[str]) -> list[SceneItem]:
     """Return parts in one colour per item; the first part of a group has the group's label."""
     labels = {name: name for name in turned}
     for group, members in product.groups.items():
@@ -114,14 +97,14 @@ def _parts(
     labels |= dict.fromkeys(labelled[MOST_LABELS:], "")
     place = {n: k for k, item in enumerate(product.items()) for n in product.members(item)}
     return [
-        SceneItem(mesh, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
-        for name, mesh in turned.items()
+        SceneItem(body, MOVED if name in moved else PARTS[place[name] % len(PARTS)], labels[name])
+        for name, body in turned.items()
     ]
 
 
-def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trimesh:
+def arrow(bodies: Sequence[Body], along: np.ndarray) -> trimesh.Trimesh:
     """Return an arrow beside a body that points along a direction."""
-    low, high = _box(meshes)
+    low, high = box(bodies)
     size = float(np.linalg.norm(high - low))
     length, radius = max(0.6 * size, 0.015), max(0.02 * size, 0.0008)
     shaft = trimesh.creation.cylinder(radius, 0.65 * length, sections=24)
@@ -136,6 +119,13 @@ def arrow(meshes: Sequence[trimesh.Trimesh], along: np.ndarray) -> trimesh.Trime
     reach = np.abs(beside) @ (high - low) / 2 / np.abs(beside).sum() + 5 * radius
     start = (low + high) / 2 + beside * reach - 0.3 * length * along
     return whole.apply_translation(start)
+
+
+@cache
+def jig(bag: BagParameters) -> tuple[SceneItem, ...]:
+    """Return bag and base plate, the same in every picture."""
+    shapes = (bag_mesh(bag), BAG), (base_mesh(bag), BASE)
+    return tuple(SceneItem(Body(Shape(mesh)), color, frame=False) for mesh, color in shapes)
 
 
 def bag_mesh(bag: BagParameters) -> trimesh.Trimesh:

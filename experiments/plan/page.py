@@ -9,6 +9,7 @@ from pathlib import Path
 
 from cell.products.product import Product
 from experiments.plan.arrangement import exploded, step_arrangement
+from experiments.plan.drawn import DrawnProduct
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import figures, page, pairs, section, table
@@ -25,7 +26,7 @@ from planning.fixture_analysis.footprint import USUAL_DEPTH
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.advice_format import advice_text, constraint_text
 
-MOST_STEPS_PICTURED = 30  # A picture takes 0.1 to 0.5 s and 80 kB.
+MOST_STEPS_PICTURED = 30  # A picture takes 0.1 s and 70 kB.
 MOST_BLOCKERS = 400
 
 
@@ -50,15 +51,16 @@ def write_page(
     started = time.perf_counter()
     problem = rendering_problem()
     evidence = evidence_text(plan.evidence) if plan.evidence else ""
-    apart = ""
+    apart, drawn = "", None
     if plan.steps and problem is None:
-        shown = exploded(product, plan.steps)
+        drawn = DrawnProduct.of(product)
+        shown = exploded(drawn, plan.steps)
         apart = _figure(shown, "Each item moved out against its mating direction")
     missing = [f"No pictures: {problem}."] if problem else []
     sections = [
         _summary(plan, [*notes, *missing]),
         section("Orders", _orders(plan.orders)),
-        section("Steps", _steps(product, plan, choices, setup, pictured=problem is None)),
+        section("Steps", _steps(drawn, plan, choices, setup)),
         section("Exploded view", apart),
         section("Matrices", _matrices(plan)),
         section("Evidence", f"<pre>{escape(evidence)}</pre>" if evidence else ""),
@@ -99,11 +101,7 @@ def _orders(advice: OrderAdvice | None) -> str:
 
 
 def _steps(
-    product: Product,
-    plan: FixingPlan,
-    choices: Sequence[Choice],
-    setup: FixtureSetup,
-    pictured: bool,
+    drawn: DrawnProduct | None, plan: FixingPlan, choices: Sequence[Choice], setup: FixtureSetup
 ) -> str:
     scores = f"<details><summary>What the scores mean</summary>{pairs(CRITERIA)}</details>"
     parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
@@ -111,25 +109,25 @@ def _steps(
     for number, step in enumerate(plan.steps):
         choice = choices[number] if number < len(choices) else None
         parts.append(f"<h3>{number + 1}. {escape(step.item)}</h3>")
-        if pictured and number < MOST_STEPS_PICTURED:
-            parts.append(_picture(product, plan, number, choice, setup))
+        if drawn and number < MOST_STEPS_PICTURED:
+            parts.append(_picture(drawn, plan, number, choice, setup))
         parts.append(
             f"<p><b>Algorithm 1: {escape(step.posture)} / {escape(step.fixed_part)}.</b> "
             f"{escape(reasons[number].strip())}</p>"
         )
         parts.append(_choice(choice) if choice else "")
-    if pictured and len(plan.steps) > MOST_STEPS_PICTURED:
+    if drawn and len(plan.steps) > MOST_STEPS_PICTURED:
         parts.append(f"<p>The first {MOST_STEPS_PICTURED} steps are pictured.</p>")
     return "\n".join(parts) if plan.steps else ""
 
 
 def _picture(
-    product: Product, plan: FixingPlan, number: int, choice: Choice | None, setup: FixtureSetup
+    drawn: DrawnProduct, plan: FixingPlan, number: int, choice: Choice | None, setup: FixtureSetup
 ) -> str:
     step = plan.steps[number]
     figured = choice.candidates[choice.paper].figures if choice else {}
     depth = figured.get("depth_m", USUAL_DEPTH)
-    shown = step_arrangement(product, step, setup.jig.bag, depth)
+    shown = step_arrangement(drawn, step, setup.jig.bag, depth)
     sides = [step.item, subassembly_name(plan.order[: number + 1])]
     moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
     return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")

@@ -1,4 +1,4 @@
-"""Static pictures of parts: meshes in a scene, a camera that frames them, labels."""
+"""Static pictures of parts: bodies in a scene, a camera that frames them, labels."""
 
 from __future__ import annotations
 
@@ -8,20 +8,10 @@ from dataclasses import dataclass
 from html import escape
 
 import numpy as np
-import trimesh
-from pydrake.common import MemoryFile
-from pydrake.geometry import (
-    GeometryInstance,
-    InMemoryMesh,
-    Mesh,
-    PerceptionProperties,
-    Rgba,
-    SceneGraph,
-)
-from pydrake.math import RigidTransform
+from pydrake.geometry import GeometryInstance, PerceptionProperties, Rgba, SceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
-from cell.products.mesh_io import obj_text
+from experiments.plan.drawn import Body, box
 from experiments.reporting.render import View, take_picture
 
 FIELD_OF_VIEW = 24.0  # [deg] Narrow: parallel edges look parallel.
@@ -34,23 +24,23 @@ Color = tuple[float, float, float]
 
 @dataclass(frozen=True, eq=False)
 class SceneItem:
-    """One mesh in a picture.
+    """One body in a picture.
 
     Attributes:
-        mesh: In W [m].
+        body: Its shape and pose.
         color: Red, green, blue from 0 to 1.
         name: Text of its label; "" for none.
         frame: Whether the camera must frame all of it.
     """
 
-    mesh: trimesh.Trimesh
+    body: Body
     color: Color
     name: str = ""
     frame: bool = True
 
 
 def picture(shown: Sequence[SceneItem]) -> tuple[bytes, View]:
-    """Return a PNG of meshes, and the camera it was taken with.
+    """Return a PNG of bodies, and the camera it was taken with.
 
     Raises:
         NoRendering: This machine cannot render.
@@ -59,23 +49,21 @@ def picture(shown: Sequence[SceneItem]) -> tuple[bytes, View]:
     scene_graph = builder.AddSystem(SceneGraph())
     source = scene_graph.RegisterSource("picture")
     for number, item in enumerate(shown):
-        file = MemoryFile(obj_text(item.mesh, normals=True), ".obj", f"part {number}")
-        mesh = Mesh(InMemoryMesh(mesh_file=file))
-        geometry = GeometryInstance(RigidTransform(), mesh, f"part {number}")
+        mesh, X_WS = item.body.shape.drake_mesh, item.body.X_WS
+        geometry = GeometryInstance(X_WS, mesh, f"part {number}")
         properties = PerceptionProperties()
         properties.AddProperty("phong", "diffuse", Rgba(*item.color, 1.0))
         geometry.set_perception_properties(properties)
         scene_graph.RegisterAnchoredGeometry(source, geometry)
     diagram = builder.Build()
-    view = view_of(item.mesh for item in shown if item.frame)
+    view = view_of(item.body for item in shown if item.frame)
     context = diagram.CreateDefaultContext()
     return take_picture(scene_graph, context, view, shadows=False), view
 
 
-def view_of(meshes: Iterable[trimesh.Trimesh]) -> View:
-    """Return a camera that frames meshes, from the front and above."""
-    points = np.concatenate([mesh.bounds for mesh in meshes])
-    low, high = points.min(axis=0), points.max(axis=0)
+def view_of(bodies: Iterable[Body]) -> View:
+    """Return a camera that frames bodies, from the front and above."""
+    low, high = box(bodies)
     centre, radius = (low + high) / 2, np.linalg.norm(high - low) / 2
     distance = 1.02 * radius / np.sin(np.deg2rad(FIELD_OF_VIEW / 2))
     eye = centre + distance * TOWARDS / np.linalg.norm(TOWARDS)
@@ -104,7 +92,7 @@ def figure(png: bytes, view: View, shown: Sequence[SceneItem], caption: str) -> 
 
 def _labels(view: View, named: Sequence[SceneItem]) -> str:
     """Return the names in a column at the right edge, with a line to each part."""
-    at = [projected(view, item.mesh.bounds.mean(axis=0)) for item in named]
+    at = [projected(view, item.body.bounds.mean(axis=0)) for item in named]
     order = sorted(range(len(named)), key=lambda k: at[k][1])
     lines, y = [], 0.0
     for k in order:

@@ -1,9 +1,10 @@
 """Which parts block which others along one axis, with the margin of each decision.
 
-Three rounds, each for the pairs that the previous one left undecided. Bounding boxes find parts
+Four rounds, each for the pairs that the previous one left undecided. Bounding boxes find parts
 that pass each other. The widest faces, for all pairs of parts at once, settle most blocked pairs:
-two large faces in each other's way suffice. All faces that can hit each other decide the rest; only
-regions made of slivers need their union.
+two large faces in each other's way suffice. Finely tessellated parts have no large faces: they are
+looked at over a few probes, about which the outermost faces of both are compared. All faces that
+can hit each other decide the rest; only regions made of slivers need their union.
 
 A decision flips at some critical tolerance, below which the pair is blocked and above which it is
 free. It is computed only where it matters: a pair blocked at 1.5 times the tolerance, or free at
@@ -12,7 +13,7 @@ half of it, is decided with a margin of at least half the tolerance (0.025 mm of
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,8 @@ from planning.feasibility.face_pairs import (
     FacePairs,
     blocked_regions,
     crossing_faces,
+    faces_about,
+    heights_over,
     paired,
 )
 
@@ -38,7 +41,8 @@ SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
 FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
-PROBES = 48  # Faces of a finely tessellated part that are tried before all of them are.
+PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
+ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
 SEEDS, NEAR = 4, 4.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
 
@@ -67,7 +71,7 @@ def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, in
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
     hits = _wide_hits(views, pairs, more)
-    hits |= _region_hits(dict(_probes(views, pairs, hits, more)), more)
+    hits |= _probed(views, pairs, hits, more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
@@ -82,20 +86,45 @@ def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, in
     return found | _decided(group, tolerance)
 
 
-def _probes(
+def _probed(
     views: Sequence[Envelope],
     pairs: np.ndarray,
     known: Mapping[tuple[int, int], np.ndarray],
     tolerance: float,
-) -> Iterator[tuple[tuple[int, int], FacePairs]]:
-    """Yield a sample of the face pairs of finely tessellated parts that are undecided."""
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return a blocked point (2,) for finely tessellated parts that overlap about some probe."""
+    hits: dict[tuple[int, int], np.ndarray] = {}
     for i, k in ((int(i), int(k)) for i, k in pairs):
         down, up = views[i].down, views[k].up
-        if (i, k) not in known and len(down.low) * len(up.low) > DENSE:
-            few = down.chosen(np.linspace(0, len(down.low) - 1, PROBES).astype(int))
-            found = crossing_faces(few, up, tolerance)
-            if len(found):
-                yield (i, k), found
+        if (i, k) in known or len(down.low) * len(up.low) <= DENSE:
+            continue
+        for probe in _deepest_probes(down, up, tolerance):
+            around = blocked_regions([faces_about(down, up, probe, ABOUT * tolerance)], tolerance)
+            point = point_in_wide_union([around.within(probe, ABOUT * tolerance)], tolerance)
+            if point is not None:
+                hits[i, k] = point
+                break
+    return hits
+
+
+def _deepest_probes(down: Faces, up: Faces, tolerance: float) -> np.ndarray:
+    """Return a few centres of faces (n, 2) over which the parts are in each other's way."""
+    probes = np.concatenate(
+        [
+            faces.corners[np.linspace(0, len(faces.low) - 1, PROBES).astype(int)].mean(axis=1)
+            for faces in (down, up)
+        ]
+    )
+    low = np.maximum(down.lower[:2], up.lower[:2])
+    high = np.minimum(down.upper[:2], up.upper[:2])
+    probes = probes[((probes > low) & (probes < high)).all(axis=1)]
+    if not len(probes):
+        return probes
+    bottoms = [h.min(initial=np.inf) for h in heights_over(down, probes)]
+    tops = [h.max(initial=-np.inf) for h in heights_over(up, probes)]
+    excess = np.array(tops) - np.array(bottoms)
+    deepest = np.argsort(-excess)[:SEEDS]
+    return probes[deepest[excess[deepest] > tolerance]]
 
 
 def _meeting_boxes(views: Sequence[Envelope], tolerance: float) -> np.ndarray:

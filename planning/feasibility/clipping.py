@@ -43,6 +43,14 @@ class Polygons:
         corners[cut, : outlines.shape[1]] = outlines
         return Polygons(corners, count)
 
+    def within(self, centre: np.ndarray, reach: float) -> Polygons:
+        """Return what lies within reach [m] of a point (2,) along both axes."""
+        kept = self
+        for axis in (0, 1):
+            for sign in (1.0, -1.0):
+                kept = kept.clipped(reach - sign * (kept.corners[..., axis] - centre[axis]))
+        return kept
+
     def _cut(self, signed: np.ndarray, kept: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Return corners (n, m, 2) and their numbers (n,) of polygons that the line crosses."""
         n, k = signed.shape

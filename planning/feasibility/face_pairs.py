@@ -3,7 +3,8 @@
 A pair counts if the bounding rectangles of the projections overlap and the up-face can lie above
 the down-face somewhere in that overlap. The second test bounds the height difference, a linear
 function, over the rectangle: it discards the faces of two surfaces that lie on each other, of which
-a finely tessellated fit has tens of thousands.
+a finely tessellated fit has tens of thousands. Of parts with many faces, only those that share a
+place (``cells``) are paired.
 """
 
 from __future__ import annotations
@@ -13,11 +14,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from planning.feasibility.cells import crossing_pairs, touching
 from planning.feasibility.clipping import Polygons, triangle_overlaps
 from planning.feasibility.envelope import Faces
 
 DENSE = 400_000  # Up to this many pairs, comparing all with all is faster than a grid.
 ON_EDGE = 1e-12  # [m] A point on the edge of a face's box counts as inside.
+OUTERMOST = 96  # Faces of each part about a point: more than lie within a few tolerances of it.
 FIRST_ROW, FIRST_COLUMN = 1, 2
 CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
 
@@ -107,6 +110,23 @@ def overlapping_faces(a: Faces, b: Faces) -> FacePairs:
     return paired(a, b, d[row], u[column])
 
 
+def faces_about(down: Faces, up: Faces, point: np.ndarray, reach: float) -> FacePairs:
+    """Return the pairs of the lowest down-faces and the highest up-faces near a point (2,) [m].
+
+    The faces below them, as of the turns of a thread, only cover the same regions once more.
+    """
+    d, u = (_outermost(faces, point, reach) for faces in (down, up))
+    return paired(down, up, np.repeat(d, len(u)), np.tile(u, len(d)))
+
+
+def _outermost(faces: Faces, point: np.ndarray, reach: float) -> np.ndarray:
+    every, box = np.arange(len(faces.low)), ((point - reach)[None], (point + reach)[None])
+    near = np.flatnonzero(touching(faces, every, *box))
+    heights = faces.planes[near, :2] @ point + faces.planes[near, 2]
+    heights = np.clip(heights, faces.low[near, 2], faces.high[near, 2])
+    return near[np.argsort(-faces.facing * heights, kind="stable")[:OUTERMOST]]
+
+
 def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     """Return the pairs of faces that can hit each other.
 
@@ -118,9 +138,12 @@ def crossing_faces(down: Faces, up: Faces, height: float) -> FacePairs:
     d, u = _near(down, up, height), _near(up, down, height)
     if not len(d) or not len(u):
         return paired(down, up, d[:0], u[:0])
-    boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
-    row, column = box_pairs(*boxes)
-    d, u = d[row], u[column]
+    if len(d) * len(u) > DENSE:
+        d, u = crossing_pairs(down, up, d, u, height)
+    else:
+        boxes = down.low[d, :2], down.high[d, :2], up.low[u, :2], up.high[u, :2]
+        row, column = box_pairs(*boxes)
+        d, u = d[row], u[column]
     chosen = up.high[u, 2] > down.low[d, 2] + height
     d, u = d[chosen], u[chosen]
     pairs = paired(down, up, d, u)

@@ -12,7 +12,7 @@ import numpy as np
 
 from cell.errors import BadPart
 from cell.products.product import Part, Product
-from planning.feasibility.directions import unit_vector
+from planning.feasibility.directions import axis_index, unit_vector
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +42,11 @@ class Solid:
     def upper(self) -> np.ndarray:
         """(3,) upper corner of the bounding box in A [m]."""
         return self.vertices.max(axis=0)
+
+    def lowest(self, up: str) -> float:
+        """Return the height of the lowest point when the axis ``up`` points up [m]."""
+        axis = axis_index(up)
+        return float(self.lower[axis] if up[0] == "+" else -self.upper[axis])
 
     @cached_property
     def triangles(self) -> np.ndarray:
@@ -118,6 +123,5 @@ def combined_cog(solids: Mapping[str, Solid], names: Iterable[str]) -> np.ndarra
 def cog_height(solids: Mapping[str, Solid], names: Iterable[str], up: str) -> float:
     """Return how high the combined CoG is above the lowest point when ``up`` points up [m]."""
     names = list(names)
-    axis = unit_vector(up)
-    lowest = min(float((solids[name].vertices @ axis).min()) for name in names)
-    return float(combined_cog(solids, names) @ axis) - lowest
+    lowest = min(solids[name].lowest(up) for name in names)
+    return float(combined_cog(solids, names) @ unit_vector(up)) - lowest

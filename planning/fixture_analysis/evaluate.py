@@ -13,7 +13,7 @@ from planning.feasibility.matrices import AssemblyMatrices
 from planning.feasibility.solids import combined_cog
 from planning.fixture_analysis.candidate import Candidate, FixtureSetup, Proposal
 from planning.fixture_analysis.capacity import sideways_capacity, turning_capacity
-from planning.fixture_analysis.footprint import footprint, standing_points
+from planning.fixture_analysis.footprint import USUAL_DEPTH, footprint, standing_points
 from planning.fixture_analysis.grip import GripAnalysis
 from planning.fixture_analysis.imprint import Imprint, PartSurface, depth_in_bed, press, samples_of
 from planning.fixture_analysis.loads import operation_load
@@ -164,8 +164,10 @@ class _Evaluation:
 
     def _footprint_diameter(self) -> float:
         """Return the diameter of the circle around the footprint [m]."""
-        solids = [self.solids[name] for name in self.proposal.body]
-        outline = footprint(standing_points(solid.vertices @ self.R_JA.T for solid in solids))
+        reach, lowest = self.low + USUAL_DEPTH, self.shared.lowest
+        low = [name for name in self.proposal.body if lowest((name,), self.R_JA) <= reach]
+        turned = (self.solids[name].vertices @ self.R_JA.T for name in low)
+        outline = footprint(standing_points(turned))
         diameter = 0.0 if outline is None else outline.circle[1]
         self.figures["footprint_diameter_m"] = diameter
         aperture = 2 * self.setup.jig.bag.aperture_radius

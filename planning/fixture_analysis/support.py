@@ -9,7 +9,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from cell.products.product import Product
-from planning.feasibility.directions import opposite, unit_vector
+from planning.feasibility.directions import opposite
 from planning.feasibility.matrices import AssemblyMatrices
 from planning.fixture_analysis.footprint import USUAL_DEPTH
 
@@ -47,8 +47,7 @@ class SupportAnalysis:
         A part stays if it reaches down into the bed, is fastened to a part that stays, or has a
         part that stays in its way down.
         """
-        axis = unit_vector(up)
-        low = np.array([(self.matrices.solids[name].vertices @ axis).min() for name in body])
+        low = np.array([self.matrices.solids[name].lowest(up) for name in body])
         return self._unsupported(body, up, low <= low.min() + USUAL_DEPTH)
 
     def dropped(self, carried: Sequence[str], up: str) -> list[str]:

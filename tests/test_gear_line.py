@@ -1,0 +1,33 @@
+"""The generated machine of the planner's benchmark: what is known of it by how it is made."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from tiny_products import product_of
+
+from cell.errors import InputError
+from experiments.plan.gear_line import gear_line
+from planning import plan
+from planning.feasibility.matrices import matrices_of
+
+
+def test_everything_leaves_upwards_in_the_order_in_which_it_is_made():
+    """Each part leaves those before it upwards; the 4 screws of a station hold in the base."""
+    shapes = gear_line(2, fineness=0.3)
+    assert len(shapes) == 9 * 2 + 4
+    fixing = plan(product_of(shapes), tuple(shapes))
+    assert fixing.feasible
+    assert np.all(np.tril(fixing.free["+z"], -1) == np.tril(np.ones_like(fixing.contact), -1))
+    assert fixing.matrices is not None
+    threads = fixing.matrices.threads
+    assert {thread.nut for thread in threads} == {"base"} and len(threads) == 8
+    names = list(shapes)
+    gears = [names.index(f"gear_{k}") for k in (1, 2)]
+    assert not (fixing.contact + fixing.contact.T)[np.ix_(gears, gears)].any()
+    assert fixing.free["+x"][gears[0], gears[1]] == 0  # Their teeth mesh.
+
+
+def test_a_cover_in_its_pillars_is_refused():
+    with pytest.raises(InputError, match=r"'pillar_1' and 'cover' overlap"):
+        matrices_of(product_of(gear_line(1, fineness=0.3, overlap=0.3)))
