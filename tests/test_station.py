@@ -7,10 +7,13 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.configuration.config import CellConfig
+from cell.machines.arm import Arm
 from cell.products.loading import load_product
 from experiments.assembly.prepare import RunningCell
 from planning.motion.paths import NoPath
+from planning.motion.timing import JointMotion
 from planning.motion.together import keep_apart
+from planning.operations.grasping import CLEAR, HandPhase, let_go
 from planning.operations.station import Station
 
 DOWN = RollPitchYaw(np.pi, 0.0, 0.0)
@@ -71,3 +74,24 @@ def test_straight_lines_are_checked_against_the_other_arm_only() -> None:
     station.cell.plant.SetPositions(station.context, driver.instance, q_near)
     across = station.line(holder, tip, RigidTransform(DOWN, [x + 0.12, y, z + 0.2]))
     assert not station.clear_of_arms(holder, across)
+
+
+@pytest.mark.parametrize(("free", "end"), [(1.0, 0.08), (0.05, 0.04), (0.0, CLEAR)])
+def test_hand_backs_off_as_far_as_the_other_arm_lets_it(
+    station: Station, monkeypatch: pytest.MonkeyPatch, free: float, end: float
+) -> None:
+    """In any case it gets clear of the part."""
+    holder, tip = station.holder, station.holder.frame("tip")
+
+    def height(q: np.ndarray) -> float:
+        return float(holder.tool_pose(station.context, tip, q).translation()[2])
+
+    def clear(self: Station, arm: Arm, motion: JointMotion) -> bool:
+        return height(motion.q[-1]) - height(motion.q[0]) < free
+
+    monkeypatch.setattr(Station, "clear_of_arms", clear)
+    grasp = next(grasp for grasp in station.part("motor").grasps if grasp.jaw == "tip")
+    phases = {phase.kind: phase for phase in let_go(station, "motor", grasp, 0.08, frozenset())}
+    back = phases[HandPhase.RETREAT].commands[holder.name]
+    assert isinstance(back, JointMotion)
+    assert height(back.q[-1]) - height(back.q[0]) == pytest.approx(end, abs=1e-6)

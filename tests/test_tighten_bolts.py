@@ -1,4 +1,4 @@
-"""Fastening: the order in which bolts are tightened."""
+"""Fastening: the order in which bolts are tightened, and how the driver comes to them."""
 
 from __future__ import annotations
 
@@ -7,12 +7,22 @@ from typing import cast
 
 import numpy as np
 import pytest
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 
+from cell.configuration.config import CellConfig
 from cell.machines.driver import DriverReading
+from cell.products.loading import load_product
 from cell.simulation.phase import Sensed
+from experiments.assembly.prepare import running_cell
+from planning.motion.timing import JointMotion
+from planning.operations.counter_hold import Coming
 from planning.operations.station import Station
-from planning.operations.tighten_bolts.phases import CLUTCH_TIME, Clutch, star_order
+from planning.operations.tighten_bolts.phases import (
+    CLUTCH_TIME,
+    Clutch,
+    come_beside,
+    star_order,
+)
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
@@ -63,3 +73,44 @@ def test_clutch_trips_on_torque_that_lasts_and_not_on_a_shock(dt: float) -> None
     shock, steps = 0.8, round(CLUTCH_TIME / dt)
     assert trip_time([0.0, shock] * 20, dt) is None
     assert trip_time([0.0, *[0.5] * (steps + 1)], dt) == pytest.approx(2 * dt + CLUTCH_TIME)
+
+
+@pytest.fixture(scope="module")
+def station_with_bolt() -> Station:
+    """A bolt stands over the jig, both arms wait at home."""
+    station = running_cell(load_product("motor_unit"), CellConfig(), 0)[1]
+    x, y, z = station.cell.X_WJ.translation()
+    body = station.cell.parts["bolt_1"].body
+    X_WBolt = RigidTransform([x, y, z + 0.1])
+    station.cell.plant.SetFreeBodyPose(station.context, body, X_WBolt)
+    station.look()
+    return station
+
+
+def coming(station: Station, q_then: np.ndarray) -> Coming:
+    """The hand stays at home for a second, then goes somewhere."""
+    home = station.holder.home
+    motion = JointMotion(np.array([0.0, 1.0]), np.array([home, home]), np.zeros((2, len(home))))
+    return Coming(motion, q_then, np.array([0.02, 0.02]))
+
+
+def test_driver_comes_over_the_bolt_while_the_hand_moves(station_with_bolt: Station) -> None:
+    station, driver = station_with_bolt, station_with_bolt.driver
+    commands = come_beside(station, "bolt_1", coming(station, station.holder.home))
+    motion = commands[driver.name]
+    assert isinstance(motion, JointMotion)
+    p_WE = driver.tool_pose(station.context, driver.frame("tool_tip"), motion.q[-1]).translation()
+    p_WBolt = station.pose_of("bolt_1").translation()
+    np.testing.assert_allclose(p_WE[:2], p_WBolt[:2], atol=1e-6)
+    assert p_WE[2] > p_WBolt[2]
+
+
+def test_driver_stays_where_the_hand_would_meet_it(station_with_bolt: Station) -> None:
+    station, holder = station_with_bolt, station_with_bolt.holder
+    above = RigidTransform(
+        RollPitchYaw(np.pi, 0.0, 0.0), station.pose_of("bolt_1").translation() + [0.0, 0.0, 0.03]
+    )
+    q_hand = station.configuration(
+        holder, holder.frame("tip"), above, holder.home, [(station.hand, "bolt_1")]
+    )
+    assert come_beside(station, "bolt_1", coming(station, q_hand)) == {}

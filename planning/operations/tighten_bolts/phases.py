@@ -144,7 +144,7 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     yield from look(station, DrivePhase.LOOK, clamped)
 
     def meanwhile(coming: Coming) -> dict[str, Command]:
-        return _come_beside(station, order[0], coming)
+        return come_beside(station, order[0], coming)
 
     if station.config.driver.counter_hold:
         grasp = yield from hold(station, clamped, meanwhile)
@@ -295,10 +295,15 @@ def _above(
     return min(found, key=lambda q: float(np.max(np.abs(q - near))))
 
 
-def _come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:
+def come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:
     """Return the command that brings the driver over a bolt while the hand comes, too.
 
     Where they would be in each other's way, there is none: the driver comes when the hand is there.
+
+    Args:
+        station: The planner's view of the cell.
+        bolt: Name of the bolt.
+        coming: What the hand is about to do.
     """
     driver, hand, jaws = station.driver, station.holder.name, {station.hand: coming.jaws}
     try:
