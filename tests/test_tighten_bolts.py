@@ -13,7 +13,7 @@ from cell.configuration.config import CellConfig
 from cell.machines.driver import DriverReading
 from cell.products.loading import load_product
 from cell.simulation.phase import Sensed
-from experiments.assembly.prepare import running_cell
+from experiments.assembly.prepare import RunningCell
 from planning.motion.timing import JointMotion
 from planning.operations.counter_hold import Coming
 from planning.operations.station import Station
@@ -78,7 +78,7 @@ def test_clutch_trips_on_torque_that_lasts_and_not_on_a_shock(dt: float) -> None
 @pytest.fixture(scope="module")
 def station_with_bolt() -> Station:
     """A bolt stands over the jig, both arms wait at home."""
-    station = running_cell(load_product("motor_unit"), CellConfig(), 0)[1]
+    station = RunningCell(load_product("motor_unit"), CellConfig(), 0).station
     x, y, z = station.cell.X_WJ.translation()
     body = station.cell.parts["bolt_1"].body
     X_WBolt = RigidTransform([x, y, z + 0.1])
