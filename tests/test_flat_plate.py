@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pytest
 from pydrake.math import RigidTransform, RotationMatrix
@@ -11,6 +13,7 @@ from stories import Player, free, small_product
 from cell import Cell, CellConfig, Simulation, build_cell
 from cell.fixtures import FIXTURES, fixture_class
 from cell.fixtures.base import Fixture
+from cell.fixtures.flat_plate import FlatPlate
 from cell.simulation.state import restore_state, save_state
 
 PART = "plate"  # Of the product: it lies on its front face, the foot up.
@@ -96,3 +99,31 @@ def test_planners_obstacle_is_the_plate(cell: Cell) -> None:
     points = np.array([hull.vertex(i) for i in range(hull.num_vertices())])
     assert points[:, 2].max() == pytest.approx(cell.fixture.entry_height)
     assert np.hypot(*points[:, :2].T).max() == pytest.approx(CONFIG.jig.bag.aperture_radius)
+
+
+class Counting(FlatPlate):
+    """A fixture that remembers a number as discrete state, and nothing about saving."""
+
+    name = "counting"
+
+    def __init__(self, *args: Any) -> None:
+        super().__init__(*args)
+        self.DeclareDiscreteState([0.0])
+
+    def step(self, root: Context, dt: float) -> None:
+        context = self.GetMyMutableContextFromRoot(root)
+        context.SetDiscreteState([context.get_discrete_state_vector()[0] + 1.0])
+
+
+def test_discrete_state_of_a_fixture_is_saved_without_further_ado(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    monkeypatch.setitem(FIXTURES, "counting", Counting)
+    counting = build_cell(CONFIG.with_changes({"workcell.fixture": "counting"}), small_product())
+    simulation, other = Simulation(counting), Simulation(counting)
+    for _ in range(3):
+        simulation.step()
+    restore_state(other, save_state(simulation))
+    other.step()
+    (count,) = counting.fixture.save(other.root).values()
+    assert count.tolist() == [4.0]
