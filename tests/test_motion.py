@@ -12,6 +12,7 @@ from pydrake.multibody.tree import SpatialInertia
 
 from cell.errors import RunFailure, UnknownName
 from cell.machines.arms import ARM_MODELS, ArmModel
+from planning.motion import timing
 from planning.motion.collision_model import CollisionModel, Surroundings
 from planning.motion.joint_path import JointPath
 from planning.motion.paths import NoPath, plan_line, plan_path
@@ -298,6 +299,20 @@ def test_torque_limits_slow_a_loaded_arm_and_refuse_what_it_cannot_carry(
     assert run(5.0).duration > 1.05 * run(0.1).duration
     with pytest.raises(NoTiming, match="left arm"):
         run(30.0)
+
+
+def test_shapes_left_out_of_the_arm_change_no_motion(
+    model: CollisionModel, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Only the time to read its model."""
+    home = model.arms["left"].home
+    path = JointPath(np.array([home, home + 0.4]))
+    text, _ = timing._without_shapes(model.arms["left"].model.sdf) or ("", "")
+    assert "<inertia>" in text and "<geometry>" not in text
+    quick = timed(model, path)
+    monkeypatch.setattr(timing, "_without_shapes", lambda model: None)
+    whole = timed(model, path)
+    assert np.array_equal(quick.q, whole.q) and np.array_equal(quick.time, whole.time)
 
 
 def test_standing_still_takes_no_time(model: CollisionModel) -> None:
