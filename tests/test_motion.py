@@ -306,7 +306,7 @@ def test_shapes_left_out_of_the_arm_change_no_motion(
 ) -> None:
     """Only the time to read its model."""
     home = model.arms["left"].home
-    path = JointPath(np.array([home, home + 0.4]))
+    path = JointPath(np.array([home, home + 0.4]), np.zeros(2))
     text, _ = timing._without_shapes(model.arms["left"].model.sdf) or ("", "")
     assert "<inertia>" in text and "<geometry>" not in text
     quick = timed(model, path)
