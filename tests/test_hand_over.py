@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from enum import Enum
 from pathlib import Path
 
 import numpy as np
@@ -11,12 +13,16 @@ from stories import JIG_STORY, QUICK, play_ours, small_product
 from cell import CellConfig, Simulation, build_cell
 from cell.fixtures.soft_jig import JigState, SoftJig
 from cell.products.loading import load_product
+from cell.simulation.phase import Phase, Running, SolverFailed, after
 from cell.simulation.state import hand_over
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.replay import FRAME_PERIOD, Mirror, Replay
+from experiments.assembly.run import Run
 from planning.operations.insert_shaft import INSERT_SHAFT
+from planning.operations.operation import Operation, Step
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.place_bolts import PLACE_BOLTS
+from planning.operations.station import Station
 from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 
 LINKED = CellConfig()
@@ -112,3 +118,35 @@ def test_what_is_drawn_follows_what_runs(running: RunningCell, tmp_path: Path) -
     mirror(runs.root)
     shown_q = drawn.cell.plant.GetPositions(drawn.context)
     assert np.array_equal(shown_q, runs.cell.plant.GetPositions(runs.context))
+
+
+class MadeUp(Enum):
+    """Phases of the test."""
+
+    WAIT = "wait"
+
+
+def test_operation_whose_coarse_steps_the_solver_rejects_is_repeated_with_fine_ones() -> None:
+    tried = []
+
+    def reject(simulation: Running) -> None:
+        coarse = simulation.cell.config.simulation.time_step > 1e-3
+        if coarse and simulation.time > 0.025:
+            raise SolverFailed("wait", "solver failure: made up")
+
+    def carry_out(station: Station, step: Step) -> Iterator[Phase]:
+        tried.append(station.fixed)
+        station.fixed = ("motor",)
+        for _ in range(2):
+            yield Phase(MadeUp.WAIT, after(0.02), 1.0, every_step=reject, fine_log=True)
+
+    operation = Operation("made_up", carry_out, lambda *_: {}, coarse=True)
+    run = Run(RunningCell(PRODUCT, LINKED, seed=0))
+    run.run([Step("made up", operation, ("motor",))])
+    assert tried == [(), ()]
+    (result,) = run.steps
+    assert (result.verdict, result.repeated, run.failure) == ("success", True, None)
+    log = run.simulation.log.arrays()
+    assert log["time"] == pytest.approx(np.arange(1, 41) * 1e-3)
+    assert log["phase_start"].tolist() == [0.0, 0.02]
+    assert run.simulation.time_step == 1e-3

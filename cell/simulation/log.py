@@ -24,6 +24,17 @@ class Log:
         for name, value in values.items():
             self._rows.setdefault(name, []).append(np.array(value, dtype=float))
 
+    def mark(self) -> tuple[int, int]:
+        """Return how much there is so far, for `cut`."""
+        return max(map(len, self._rows.values()), default=0), len(self.phases)
+
+    def cut(self, mark: tuple[int, int]) -> None:
+        """Forget what has come since a mark."""
+        rows, phases = mark
+        for column in self._rows.values():
+            del column[rows:]
+        del self.phases[phases:]
+
     def arrays(self) -> dict[str, np.ndarray]:
         """Return every column as an array (rows first), and the phases as two arrays."""
         columns = {name: np.array(rows) for name, rows in self._rows.items()}

@@ -213,7 +213,7 @@ class Outcome:
 
 
 class PhaseFailed(RunFailure):
-    """A phase that timed out, tripped its guard or broke the solver.
+    """A phase that timed out, tripped its guard or left the state not finite.
 
     Attributes:
         phase: Its name.
@@ -224,3 +224,7 @@ class PhaseFailed(RunFailure):
         super().__init__(f"{phase}: {evidence}")
         self.phase = phase
         self.evidence = evidence
+
+
+class SolverFailed(PhaseFailed):
+    """A step of the plant that Drake's contact solver could not solve."""

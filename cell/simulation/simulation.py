@@ -30,6 +30,7 @@ from cell.simulation.phase import (
     Phase,
     PhaseFailed,
     Sensed,
+    SolverFailed,
     Spin,
 )
 
@@ -136,7 +137,7 @@ class Simulation:
                 self.step()
             except RuntimeError as error:
                 message = str(error).splitlines()[0]
-                raise PhaseFailed(phase.name, f"solver failure: {message}") from error
+                raise SolverFailed(phase.name, f"solver failure: {message}") from error
             if phase.every_step is not None:
                 phase.every_step(self)
             sensed = run.sense()

@@ -82,6 +82,11 @@ class RunningCell:
         self.disturbance = Disturbance.draw(self.config, self.seed)
         self._switch(self.config.simulation.time_step)
 
+    @property
+    def coarse(self) -> bool:
+        """Whether the present simulation takes coarse steps."""
+        return self.simulation.time_step > self.config.simulation.time_step
+
     def switch(self, operation: Operation) -> None:
         """Let the present simulation be that at the time step of an operation, as it was left."""
         steps = self.config.simulation

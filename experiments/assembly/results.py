@@ -23,6 +23,7 @@ from planning.operations.phase_class import PhaseClass
 
 FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
 
+REPEATED = "carried out again with fine time steps, as the solver failed at a coarse one."
 ASLEEP = "A part that rests while nothing touches it sleeps: the force plate does not feel it then."
 
 
@@ -110,6 +111,8 @@ def _notes(run: Run, pictures: Pictures) -> list[str]:
     if run.failure is not None:
         notes.append(f"Failed in '{run.failure.phase}': {run.failure.evidence}")
     for step in run.steps:
+        if step.repeated:
+            notes.append(f"{step.name}: {REPEATED}")
         for check in step.failed_checks:
             value = "not measured" if check.value is None else f"{check.value:.4g}"
             notes.append(

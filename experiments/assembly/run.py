@@ -11,7 +11,7 @@ from typing import Protocol
 import numpy as np
 
 from cell.errors import InputError, RunFailure
-from cell.simulation.phase import Outcome, Phase, PhaseFailed
+from cell.simulation.phase import Outcome, Phase, PhaseFailed, SolverFailed
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from experiments.assembly.prepare import RunningCell
@@ -36,6 +36,8 @@ class StepResult:
         sim_seconds, cpu_seconds: Simulated time, and CPU time with planning in it [s].
         measured: Quantity -> value; SI units are in the names.
         failed_checks: What was measured outside of its limit.
+        repeated: Whether it was carried out again with fine steps, as the solver failed at a coarse
+            one.
     """
 
     name: str
@@ -45,6 +47,7 @@ class StepResult:
     cpu_seconds: float
     measured: dict[str, float]
     failed_checks: tuple[FailedCheck, ...]
+    repeated: bool = False
 
 
 @dataclass(frozen=True)
@@ -95,6 +98,7 @@ class Run:
     timeline: Timeline = field(init=False)
     _phase: str = ""
     _start: State = field(default_factory=dict)
+    _rejected: bool = False
 
     def __post_init__(self) -> None:
         self.timeline = Timeline(self.simulation.cell.arms)
@@ -134,14 +138,19 @@ class Run:
         record = self._record(step)
         self.records.append(record)
         self.running.go_on(step.operation)
+        state, mark, bars = save_run(self), self.simulation.log.mark(), len(self.timeline.bars)
+        self._carry_out(record)
+        repeated = self._rejected and self.running.coarse
+        if repeated:
+            restore_state(self.simulation, state)
+            self.station.restore(state)
+            self.simulation.log.cut(mark)
+            del self.timeline.bars[bars:]
+            record.phases.clear()
+            self.failure = None
+            self.running.go_on()
+            self._carry_out(record)
         simulation, station = self.simulation, self.station
-        try:
-            simulation.run(self._watched(record))
-        except PhaseFailed as error:
-            self.failure = Failure(error.phase, error.evidence, self._start)
-        except RunFailure as error:
-            # A motion that cannot be planned is a verdict on the run, not bad input.
-            self.failure = Failure(self._phase, str(error), self._start)
         record.end = take_snapshot(simulation)
         record.placement = station.placements.get(step.parts[0])
         measured = measure(simulation.cell, record, simulation.log.arrays())
@@ -154,7 +163,20 @@ class Run:
             time.process_time() - started,
             measured,
             failed,
+            repeated,
         )
+
+    def _carry_out(self, record: StepRecord) -> None:
+        """Run the phases of a step; keep why they ended early, if they did."""
+        self._rejected = False
+        try:
+            self.simulation.run(self._watched(record))
+        except PhaseFailed as error:
+            self.failure = Failure(error.phase, error.evidence, self._start)
+            self._rejected = isinstance(error, SolverFailed)
+        except RunFailure as error:
+            # A motion that cannot be planned is a verdict on the run, not bad input.
+            self.failure = Failure(self._phase, str(error), self._start)
 
     def _record(self, step: Step) -> StepRecord:
         now, station = take_snapshot(self.simulation), self.station
