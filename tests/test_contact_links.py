@@ -351,5 +351,6 @@ def test_part_in_the_frozen_bed_is_linked_until_air_comes_in(linked_cell: Cell) 
 
 
 def test_full_contact_has_no_links() -> None:
-    cell = build_cell(QUICK, small_product("motor"))
+    full = QUICK.with_changes({"simulation.contact": "full"})
+    cell = build_cell(full, small_product("motor"))
     assert not cell.links.memory(Player(cell, JIG_STORY).play(440).root).made
