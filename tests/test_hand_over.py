@@ -104,7 +104,7 @@ def test_frozen_bed_goes_on_holding() -> None:
     assert linked < since <= target.time
 
 
-def test_what_is_drawn_follows_what_runs(running: RunningCell, tmp_path: Path) -> None:
+def test_what_is_drawn_follows_what_runs(tmp_path: Path) -> None:
     replay = Replay(view=False, file=tmp_path / "run.html")
     shown = RunningCell(PRODUCT, LINKED, seed=0, replay=replay)
     drawn = shown.simulation

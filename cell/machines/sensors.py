@@ -56,6 +56,8 @@ class WrenchSensor(LeafSystem):
 
 def read_all(sensors: Sequence[WrenchSensor], plant_context: Context) -> list[np.ndarray]:
     """Return the wrench (6,) of each of several sensors of one plant, as `WrenchSensor.read`."""
+    if not sensors:
+        return []
     # Once for all: Drake hands the forces of every joint over.
     forces = sensors[0].plant.get_reaction_forces_output_port().Eval(plant_context)
     return [
