@@ -212,8 +212,8 @@ def test_up_is_an_option_where_no_file_states_it(tmp_path: Path, up, fixed, caps
         (
             {"low": LOW, "high": HIGH.translate([1, 1, -2])},
             ["--units", "mm"],
-            2,
-            "'high' and 'low' overlap by .* mm",
+            1,
+            r"1 pair overlaps(.|\n)*high, low: 2 mm deep at",
         ),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--order", "low"], 2, "lacks high"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--up", "z"], 2, "No up axis 'z'"),

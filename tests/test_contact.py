@@ -1,16 +1,15 @@
-"""Contact matrix and overlap checks: touching faces, gaps, containment, overlaps."""
+"""Contact matrix: touching faces, gaps, containment; and centres of gravity."""
 
 from __future__ import annotations
 
 import numpy as np
 import pytest
 from manifold3d import Manifold
-from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_three
+from tiny_products import box, peg_in_hole, product_of, rod, stack_of_three
 
-from cell.errors import BadPart, CellError
+from cell.errors import BadPart
 from cell.products.product import Product
 from planning.feasibility.contact import contact_matrix, gap_matrix, surface_gap
-from planning.feasibility.overlaps import overlap_depth, without_overlaps
 from planning.feasibility.solids import Solid, cog_height, combined_cog, solids_of
 
 TOLERANCE = 5e-5
@@ -67,48 +66,6 @@ def test_a_part_inside_the_material_of_another_is_in_contact():
 def test_a_part_loose_in_a_cavity_is_not():
     shell = box((20, 20, 20), (0, 0, 0)) - box((14, 14, 14), (3, 3, 3))
     assert contact(product_of({"shell": shell, "seed": box((4, 4, 4), (8, 8, 8))}))[0, 1] == 0
-
-
-@pytest.mark.parametrize("depth", [0.06, 1.0])
-def test_overlapping_parts_are_refused_by_name(depth):
-    product = two_blocks(-depth)
-    with pytest.raises(CellError, match="'low' and 'high' overlap by .* mm"):
-        without_overlaps(product, solids_of(product), TOLERANCE)
-
-
-def test_contained_parts_are_refused():
-    product = product_of(
-        {"block": box((20, 20, 20), (0, 0, 0)), "seed": rod(4, 8, 12).translate([10, 10, 0])}
-    )
-    with pytest.raises(CellError, match="'block' and 'seed'"):
-        without_overlaps(product, solids_of(product), TOLERANCE)
-
-
-@pytest.mark.parametrize("gap", [0.0, -0.04, 1.0])
-def test_overlap_within_the_tolerance_is_accepted(gap):
-    product = two_blocks(gap)
-    without_overlaps(product, solids_of(product), TOLERANCE)
-
-
-def test_depth_of_a_thin_layer_is_its_thickness():
-    """2 V / A of a layer 17 x 16 x 0.2 mm: 2 % low for its rim."""
-    low, high = solids_of(two_blocks(-0.2)).values()
-    assert overlap_depth(low, high) == pytest.approx(2e-4, rel=0.03)
-
-
-def test_thread_drawn_at_the_tap_drill_is_cut_for_a_declared_fastener():
-    product = bolted(thread=2.5)
-    solids, threads = without_overlaps(product, solids_of(product), TOLERANCE)
-    assert [(thread.bolt, thread.nut) for thread in threads] == [("bolt", "base")]
-    assert solids["base"].manifold.volume() < solids_of(product)["base"].manifold.volume()
-    assert contact_matrix(gap_matrix(list(solids.values()), 1e-4), TOLERANCE)[0, 2] == 1
-
-
-def test_a_bolt_far_thicker_than_its_hole_is_refused():
-    """Overlap of 1 mm is no thread of pitch 0.5 mm."""
-    product = bolted(thread=1.0)
-    with pytest.raises(CellError, match="'base' and 'bolt'"):
-        without_overlaps(product, solids_of(product), TOLERANCE)
 
 
 def test_combined_cog_weighs_by_mass():

@@ -10,7 +10,7 @@ from test_matrices import solid
 from tiny_products import box, interlocked_links, peg_in_hole, product_of, rod
 
 from planning import plan
-from planning.feasibility.evidence import evidence_from_dict, evidence_text, evidence_to_dict
+from planning.feasibility.evidence_format import evidence_from_dict, evidence_text, evidence_to_dict
 from planning.feasibility.freedom import Freedom, contact_normals, freedom_along, freedoms
 from planning.feasibility.solids import solids_of
 

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 from tiny_products import product_of
 
-from cell.errors import InputError
 from experiments.plan.gear_line import gear_line
 from planning import plan
 from planning.feasibility.matrices import matrices_of
@@ -28,6 +27,9 @@ def test_everything_leaves_upwards_in_the_order_in_which_it_is_made():
     assert fixing.free["+x"][gears[0], gears[1]] == 0  # Their teeth mesh.
 
 
-def test_a_cover_in_its_pillars_is_refused():
-    with pytest.raises(InputError, match=r"'pillar_1' and 'cover' overlap"):
-        matrices_of(product_of(gear_line(1, fineness=0.3, overlap=0.3)))
+def test_a_cover_in_its_pillars_is_an_error():
+    shapes = gear_line(1, fineness=0.3, overlap=0.3)
+    errors = matrices_of(product_of(shapes)).errors
+    pillars = [name for name in shapes if name.startswith("pillar")]
+    assert {(one.part, one.other) for one in errors} == {(pillar, "cover") for pillar in pillars}
+    assert [one.depth for one in errors] == pytest.approx([3e-4] * len(pillars), rel=1e-3)

@@ -21,7 +21,7 @@ from planning import FixingPlan, plan
 from planning.feasibility.cache import cached_matrices, key_of
 from planning.feasibility.contact import contact_matrix, gap_matrix
 from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
-from planning.feasibility.evidence import evidence_text
+from planning.feasibility.evidence_format import evidence_text
 from planning.feasibility.interference import Interference, interference
 from planning.feasibility.matrices import AssemblyMatrices, matrices_of
 from planning.feasibility.solids import Solid, solids_of

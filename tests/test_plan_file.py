@@ -134,10 +134,6 @@ def test_command_explains_on_request(monkeypatch, capsys, tmp_path):
 
 
 def test_nothing_is_written_for_bad_input(monkeypatch, capsys, tmp_path):
-    cube = box((10, 10, 10), (0, 0, 0))
-    overlapping = product_of({"a": cube, "b": cube.translate([1, 1, 1])})
-    with pytest.raises(CellError):
-        run(monkeypatch, capsys, overlapping, tmp_path / "new")
     with pytest.raises(CellError):
         run(monkeypatch, capsys, peg_in_hole(), tmp_path / "new", order=("peg", "hole"))
     assert not (tmp_path / "new").exists()

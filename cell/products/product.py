@@ -9,6 +9,7 @@ import trimesh
 from pydrake.math import RigidTransform
 
 from cell.errors import InputError, UnknownName
+from cell.products.declared import Declared
 from cell.products.joints import Fit, Joint, Screw
 
 
@@ -69,6 +70,7 @@ class Product:
         up: Axis of the product frame that points up on the jig: "+x" ... "-z".
         contact_tolerance: Gap up to which two parts count as touching, and overlap up to which they
             do not block each other [m]; None to derive it from sizes and clearances.
+        declared: What the user vouches for where the rule for rigid bodies would refuse it.
         tray: Name of the SDF model of the tray that presents the parts; None if there is none.
         remarks: What was assumed or repaired when it was read, one sentence each.
     """
@@ -80,6 +82,7 @@ class Product:
     joints: tuple[Joint, ...] = ()
     up: str = "+z"
     contact_tolerance: float | None = None
+    declared: Declared = field(default_factory=Declared)
     tray: str | None = None
     remarks: tuple[str, ...] = ()
 

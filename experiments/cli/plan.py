@@ -42,6 +42,18 @@ class Plan:
     tolerance_mm: Annotated[float | None, arg(metavar="MM")] = None
     """Gap that still touches, overlap that does not block. Default: the product's, or derived."""
 
+    accept: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="A,B|all")] = ()
+    """Ignore the overlap of two parts, or every overlap. Repeatable."""
+
+    press: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="A,B")] = ()
+    """Declare the overlap of two parts as a press fit. Repeatable."""
+
+    snap: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="A,B")] = ()
+    """Declare that one of two parts snaps over an undercut of the other. Repeatable."""
+
+    flexible: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="PART")] = ()
+    """Declare that a part bends or stretches over what is in its way, like a belt. Repeatable."""
+
     slanted: bool = False
     """Also report ways out at an angle, from contact faces, and how far parts can move at all."""
 
@@ -88,6 +100,10 @@ class Plan:
             cache=None if self.no_cache else user_cache(),
             slanted=self.slanted,
             up=self.up,
+            accept=self.accept,
+            press=self.press,
+            snap=self.snap,
+            flexible=self.flexible,
         )
 
 

@@ -10,16 +10,23 @@ import numpy as np
 from rich.console import Console
 
 from cell.configuration.config import CellConfig
+from cell.products.declared import declared_from
 from cell.products.loading import load_product
 from experiments.plan.options import PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
-from planning.assembly_plan.explain import explanation, step_table, step_texts, stop_text
+from planning.assembly_plan.explain import (
+    explanation,
+    overlap_text,
+    step_table,
+    step_texts,
+    stop_text,
+)
 from planning.assembly_plan.plan_file import save_plan
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.feasibility.bolt_remark import bolt_remarks
 from planning.feasibility.directions import DIRECTIONS
-from planning.feasibility.evidence import evidence_text
+from planning.feasibility.evidence_format import evidence_text
 from planning.fixture_analysis.candidate import Choice, FixtureSetup
 from planning.fixture_analysis.rule import choices_text, choices_to_list, general_rule
 from planning.ordering.advice_format import advice_text
@@ -59,6 +66,14 @@ def run_plan(
     )
     if options.up:
         described = replace(described, up=options.up)
+    declared = declared_from(
+        described,
+        accept=options.accept,
+        press=options.press,
+        snap=options.snap,
+        flexible=options.flexible,
+    )
+    described = replace(described, declared=declared)
     config = config or CellConfig()
     console = Console(highlight=False)
     console.width = max(console.width, MIN_WIDTH)
@@ -110,6 +125,7 @@ def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
     console.print(step_table(fixing))
     lines = [explanation(fixing)] if explain else step_texts(fixing)
     lines += [stop_text(fixing)] if fixing.stop else []
+    lines += [overlap_text(fixing)] if fixing.overlaps else []
     lines += [advice_text(fixing.orders)] if fixing.orders else []
     lines += [evidence_text(fixing.evidence)] if fixing.evidence else []
     _print_lines(console, lines)

@@ -19,6 +19,7 @@ class PlanOptions:
         cache: Folder of the matrix cache; None for no cache.
         slanted: Whether to search for slanted removal directions and local freedom.
         up: Axis that points up on the jig, "+x" ... "-z"; None for the product's.
+        accept, press, snap, flexible: What is declared, as ``declared_from`` reads it.
     """
 
     units: str | None = None
@@ -28,3 +29,7 @@ class PlanOptions:
     cache: Path | None = None
     slanted: bool = False
     up: str | None = None
+    accept: tuple[str, ...] = ()
+    press: tuple[str, ...] = ()
+    snap: tuple[str, ...] = ()
+    flexible: tuple[str, ...] = ()

@@ -19,7 +19,7 @@ from planning.assembly_plan.explain import blocker_text, step_texts, stop_text
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import opposite
-from planning.feasibility.evidence import evidence_text
+from planning.feasibility.evidence_format import evidence_text
 from planning.feasibility.order import subassembly_name
 from planning.fixture_analysis.candidate import CRITERIA, Choice, FixtureSetup
 from planning.fixture_analysis.footprint import USUAL_DEPTH

@@ -11,9 +11,12 @@ from rich.table import Table
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import DIRECTIONS, open_directions
+from planning.feasibility.evidence_format import point_text
 from planning.feasibility.interference import Blocker
 from planning.feasibility.order import subassembly_name
 from planning.ordering.advice_format import precedence_text
+
+MOST_LISTED = 20  # Overlaps; the file holds all.
 
 
 def step_table(plan: FixingPlan) -> Table:
@@ -39,12 +42,32 @@ def stop_text(plan: FixingPlan) -> str:
     return "\n".join(lines + [f"  {blocker_text(blocker)}" for blocker in stop.blockers])
 
 
+def overlap_text(plan: FixingPlan) -> str:
+    """Return the overlaps that are not declared, deepest first; "" if there are none."""
+    if not plan.overlaps:
+        return ""
+    pairs = "pair overlaps" if len(plan.overlaps) == 1 else "pairs overlap"
+    lines = [f"{len(plan.overlaps)} {pairs}, other than in a thread:"]
+    lines += [
+        f"  {one.part}, {one.other}: {1e3 * one.depth:.3g} mm deep at {point_text(one.p_AoD)}, "
+        f"{1e9 * one.volume:.3g} mm3"
+        for one in plan.overlaps[:MOST_LISTED]
+    ]
+    more = len(plan.overlaps) - MOST_LISTED
+    lines += [f"  ... and {more} more in plan.json"] if more > 0 else []
+    pair = f"{plan.overlaps[0].part},{plan.overlaps[0].other}"
+    lines.append(
+        f"Correct poses or shapes, or declare what is meant: --press {pair} for a press fit, "
+        f"--accept {pair} to ignore it, --accept all to ignore all of them."
+    )
+    return "\n".join(lines)
+
+
 def blocker_text(blocker: Blocker) -> str:
     """Return one blocked motion as a sentence; the point is in the product frame."""
-    x, y, z = (1e3 * value + 0.0 for value in blocker.p_AoQ)
     return (
         f"{blocker.direction}: {blocker.moving} hits {blocker.staying} at "
-        f"({x:.2f}, {y:.2f}, {z:.2f}) mm after {1e3 * blocker.travel:.2f} mm"
+        f"{point_text(blocker.p_AoQ)} after {1e3 * blocker.travel:.2f} mm"
     )
 
 

@@ -15,7 +15,7 @@ from cell.errors import InputError
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING, FixingStep, Stop
 from planning.feasibility.directions import DIRECTIONS
-from planning.feasibility.evidence import evidence_from_dict, evidence_to_dict
+from planning.feasibility.evidence_format import evidence_from_dict, evidence_to_dict
 from planning.feasibility.interference import Blocker
 from planning.ordering.advice_format import advice_from_dict, advice_to_dict
 

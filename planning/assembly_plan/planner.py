@@ -19,6 +19,7 @@ from planning.feasibility.evidence import Evidence, evidence_of
 from planning.feasibility.interference import Blocker
 from planning.feasibility.matrices import AssemblyMatrices, matrices_of, reachable_matrices
 from planning.feasibility.order import check_order
+from planning.feasibility.overlaps import Overlap
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.ordering.advice import OrderAdvice, advise, fallback_order
 
@@ -59,8 +60,14 @@ class FixingPlan:
 
     @property
     def feasible(self) -> bool:
-        """Whether every item of the order can be added."""
-        return self.stop is None
+        """Whether every item of the order can be added, and no parts overlap that must not."""
+        return self.stop is None and not self.overlaps
+
+    @property
+    def overlaps(self) -> tuple[Overlap, ...]:
+        """Overlaps that are neither threads nor declared, deepest first."""
+        found = self.evidence.overlaps if self.evidence else ()
+        return tuple(one for one in found if not one.declared)
 
 
 def plan(

@@ -1,7 +1,7 @@
 """Cache of matrices, keyed by content: planning the same parts again only reads a file.
 
 The key is a digest of everything that determines the matrices: vertices and faces of every part in
-the product frame, declared screws and tolerance, and this package's own source, so that a new
+the product frame, everything declared, the tolerance, and this package's own source, so that a new
 version never reads results of an old one. A file that cannot be read counts as absent.
 """
 
@@ -25,7 +25,10 @@ from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import Blocker, Interference
 from planning.feasibility.matrices import AssemblyMatrices, matrices_of
+from planning.feasibility.overlaps import Overlap, Overlaps
 from planning.feasibility.solids import Solid, solids_of
+from planning.feasibility.tolerance import Tolerances
+from planning.feasibility.undercut import Undercut
 
 
 def user_cache() -> Path:
@@ -37,8 +40,7 @@ def user_cache() -> Path:
 def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> AssemblyMatrices:
     """Return what ``matrices_of`` returns, read from the folder if it was computed before."""
     solids = solids_of(product)
-    declared = product.contact_tolerance if tolerance is None else tolerance
-    file = folder / f"{key_of(product, solids, declared)}.npz"
+    file = folder / f"{key_of(product, solids, tolerance)}.npz"
     found = load_matrices(file, solids)
     if found is None:
         found = matrices_of(product, tolerance, solids)
@@ -49,13 +51,20 @@ def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> 
 def key_of(product: Product, solids: Mapping[str, Solid], tolerance: float | None) -> str:
     """Return a digest of everything that determines the matrices of a product."""
     digest = hashlib.blake2b(_source_digest(), digest_size=20)
-    pairs = sorted((f.part, f.into, f.pitch) for f in product.screws.values())
-    digest.update(json.dumps([tolerance, pairs]).encode())
+    screws = sorted((f.part, f.into, f.pitch) for f in product.screws.values())
+    pairs = [[sorted(pair) for pair in kind] for kind in _declared_pairs(product)]
+    parts = [sorted(product.declared.flexible), product.declared.accept_all]
+    lengths = [tolerance, product.contact_tolerance]
+    digest.update(json.dumps([lengths, screws, [sorted(kind) for kind in pairs], parts]).encode())
     for name, solid in solids.items():
         digest.update(f"{name} {solid.vertices.shape} {solid.faces.shape}".encode())
         digest.update(np.asarray(solid.vertices, float).tobytes())
         digest.update(np.asarray(solid.faces, np.int64).tobytes())
     return digest.hexdigest()
+
+
+def _declared_pairs(product: Product) -> list[frozenset[frozenset[str]]]:
+    return [product.declared.accept, product.declared.press, product.declared.snap]
 
 
 @cache
@@ -70,8 +79,9 @@ def save_matrices(matrices: AssemblyMatrices, file: Path) -> None:
     """Write matrices to a file; do nothing if the folder cannot be written to."""
     text = {
         "names": list(matrices.solids),
-        "tolerance": matrices.tolerance,
-        "threads": [asdict(thread) for thread in matrices.threads],
+        "tolerances": asdict(matrices.tolerances),
+        "overlaps": asdict(matrices.overlaps),
+        "undercuts": [asdict(one) for one in matrices.undercuts],
         "blockers": [[b.moving, b.staying, b.direction] for b in matrices.interference.blockers],
     }
     arrays = {
@@ -114,15 +124,18 @@ def _restored(arrays: Mapping[str, Any], solids: Mapping[str, Solid]) -> Assembl
     )
     free = {j: arrays["free"][k].astype(int) for k, j in enumerate(DIRECTIONS)}
     margin = {j: arrays["margin"][k] for k, j in enumerate(DIRECTIONS)}
-    threads = tuple(
+    overlaps = text["overlaps"]
+    threads = (
         CadThread(**thread | {key: tuple(thread[key]) for key in ("axis", "p_AoT")})
-        for thread in text["threads"]
+        for thread in overlaps["threads"]
     )
+    others = (Overlap(**one | {"p_AoD": tuple(one["p_AoD"])}) for one in overlaps["others"])
     return AssemblyMatrices(
         solids,
-        text["tolerance"],
+        Tolerances(**text["tolerances"]),
         arrays["contact"],
         arrays["contact_margin"],
         Interference(free, blockers, margin),
-        threads,
+        Overlaps(tuple(threads), tuple(map(tuple, overlaps["screws"])), tuple(others)),
+        tuple(Undercut(**one) for one in text["undercuts"]),
     )

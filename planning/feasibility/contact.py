@@ -5,10 +5,6 @@ other's material. CAD puts a gap into every fit, so the tolerance lies above the
 "touches" (line-to-line faces: rounding, 1e-9 m) and below the clearances that do not (0.075 mm
 radial between boss and bore, 0.2 mm between bolt and clearance hole).
 
-A product may declare its tolerance. Otherwise it is derived: 0.05 mm, above the sagitta and the
-rounding of typical meshes; less for small parts; and less than the smallest clearance, so that a
-part with play counts as not touching the wall of its hole, however small the play is.
-
 Distances come from FCL's triangle BVH. Compared with coal's ``security_margin`` on motor, plate and
 six bolts lifted apart by 0 ... 0.3 mm, every answer was the same, at 10-38 ms a product against
 1-105 ms, for 28 MB installed instead of 316 MB. Building a BVH costs most, 4 us a face [M], so it
@@ -28,11 +24,6 @@ from planning.feasibility.solids import Solid
 
 WIDEST = 16  # Faces of one part that are compared with the other's before all are.
 TOUCHING = 1e-9  # [m] [D] Faces drawn on each other coincide to the rounding of float64, 1e-16 m.
-
-USUAL = 5e-5  # [m] [A] Default tolerance: seven times the sagitta of a fine mesh (7 um: r 6, n 64).
-PER_SIZE = 1.0 / 200.0  # [A] Of the smallest part's length: 0.05 mm for a screw of 10 mm.
-PER_CLEARANCE = 2.0 / 3.0  # [A] Leaves a third of the clearance as margin.
-LINE_TO_LINE = 0.2  # [A] Of the tolerance: gaps up to this are rounding or sagitta, not clearance.
 
 
 def surface_gap(a: Solid, b: Solid) -> float:
@@ -100,21 +91,25 @@ def one_inside_other(a: Solid, b: Solid) -> bool:
     return bool(a_in_b or b_in_a) and (a.manifold ^ b.manifold).volume() > 0.0
 
 
-def gap_matrix(solids: Sequence[Solid], reach: float) -> np.ndarray:
+def gap_matrix(
+    solids: Sequence[Solid], reach: float, wanted: np.ndarray | None = None
+) -> np.ndarray:
     """Return the pairwise distances between parts, up to a reach.
 
     Args:
         solids: The n parts, in matrix order.
         reach: Gap beyond which the distance does not matter [m].
+        wanted: (n, n) bool, symmetric: pairs to measure; None for all.
 
     Returns:
         (n, n) [m], symmetric: 0 where parts touch or one lies in the other's material, infinity
-        where they are further apart than the reach, and on the diagonal.
+        where they are further apart than the reach or not wanted, and on the diagonal.
     """
     gaps = np.full((len(solids), len(solids)), np.inf)
     lower, upper = np.array([s.lower for s in solids]), np.array([s.upper for s in solids])
     near = (lower[:, None] - upper[None]).max(axis=2) <= reach
-    for i, k in np.argwhere(np.triu(near & near.T, 1)):
+    near &= near.T if wanted is None else near.T & wanted
+    for i, k in np.argwhere(np.triu(near, 1)):
         gap = near_gap(solids[i], solids[k], reach)
         inside = gap > 0.0 and one_inside_other(solids[i], solids[k])
         gaps[i, k] = gaps[k, i] = 0.0 if inside else gap
@@ -133,21 +128,3 @@ def contact_matrix(gaps: np.ndarray, tolerance: float) -> np.ndarray:
         triangular so that C + C^T holds no 2.
     """
     return np.triu(gaps <= tolerance, 1).astype(int)
-
-
-def largest_tolerance(solids: Sequence[Solid]) -> float:
-    """Return the default tolerance of parts without clearances [m], from their sizes."""
-    smallest = min(float(np.max(solid.upper - solid.lower)) for solid in solids)
-    return min(USUAL, PER_SIZE * smallest)
-
-
-def default_tolerance(solids: Sequence[Solid], gaps: np.ndarray) -> float:
-    """Return the default tolerance [m].
-
-    Args:
-        solids: The n parts.
-        gaps: (n, n) as ``gap_matrix`` returns them [m].
-    """
-    largest = largest_tolerance(solids)
-    clearances = gaps[gaps > LINE_TO_LINE * largest]
-    return min(largest, PER_CLEARANCE * float(np.min(clearances, initial=np.inf)))

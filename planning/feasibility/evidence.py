@@ -1,4 +1,4 @@
-"""Evidence behind the matrices, for the reader of a plan: tolerance, threads, margins, remarks.
+"""Evidence behind the matrices, for the reader of a plan: tolerances, overlaps, margins, remarks.
 
 A decision is fragile if changing the tolerance by less than ``FRAGILE`` of it (0.025 mm of the
 usual 0.05) flips it. The plan depends on it if A(P_t, P_i) of some step then differs.
@@ -7,8 +7,7 @@ usual 0.05) flips it. The plan depends on it if A(P_t, P_i) of some step then di
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -18,7 +17,10 @@ from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import opposite
 from planning.feasibility.freedom import Freedom, freedoms
-from planning.feasibility.matrices import AssemblyMatrices, reachable_directions
+from planning.feasibility.matrices import AssemblyMatrices, fitted_pairs, reachable_directions
+from planning.feasibility.overlaps import Overlap
+from planning.feasibility.tolerance import Tolerances
+from planning.feasibility.undercut import Undercut
 
 StepIndices = Sequence[tuple[list[int], list[int]]]
 """Matrix indices of target and incoming parts, for each step."""
@@ -67,17 +69,19 @@ class Evidence:
     """What the matrices of a plan are based on.
 
     Attributes:
-        tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
-        declared: Whether the product declares it; else it was derived.
+        tolerances: Largest gap that counts as contact, and largest overlap that does not block.
         threads: Screw threads recognised in the meshes.
+        overlaps: Other overlaps, declared ones and errors of the CAD, deepest first.
+        undercuts: What declared snap fits and flexible parts bend over.
         fragile: Decisions with a small margin, those that the plan depends on first.
         remarks: What was assumed or repaired while the product was read.
         motions: Local freedom and slanted removal directions, if they were requested.
     """
 
-    tolerance: float
-    declared: bool
+    tolerances: Tolerances
     threads: tuple[CadThread, ...]
+    overlaps: tuple[Overlap, ...]
+    undercuts: tuple[Undercut, ...]
     fragile: tuple[FragileDecision, ...]
     remarks: tuple[str, ...]
     motions: tuple[ItemFreedom, ...] = ()
@@ -101,11 +105,12 @@ def evidence_of(
     indices = [(matrices.indices(step.target), matrices.indices(step.incoming)) for step in steps]
     found = [*_fragile_contacts(matrices, indices), *_fragile_motions(matrices, indices)]
     return Evidence(
-        matrices.tolerance,
-        product.contact_tolerance == matrices.tolerance,
+        matrices.tolerances,
         matrices.threads,
+        tuple(sorted(matrices.overlaps.others, key=lambda one: -one.depth)),
+        matrices.undercuts,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
-        (*product.remarks, *_doubts(product.items(), matrices)),
+        (*product.remarks, *_idle(product, matrices), *_doubts(product.items(), matrices)),
         tuple(_item_freedoms(matrices, steps)) if slanted else (),
     )
 
@@ -114,13 +119,29 @@ def _item_freedoms(
     matrices: AssemblyMatrices, steps: Sequence[FixingStep | Stop]
 ) -> Iterator[ItemFreedom]:
     solids = dict(matrices.solids)
-    for thread in matrices.threads:
-        solids[thread.nut] = solids[thread.nut].without(matrices.solids[thread.bolt])
+    for fitted in fitted_pairs(solids, matrices.overlaps, matrices.tolerance):
+        solids |= {solid.name: solid for solid in fitted}
     for step in steps:
         incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
         axes = [thread.axis for thread in matrices.threads if thread.bolt in step.incoming]
         for freedom in freedoms(incoming, target, matrices.tolerance, axes):
             yield ItemFreedom(step.item, freedom)
+
+
+def _idle(product: Product, matrices: AssemblyMatrices) -> Iterator[str]:
+    """Yield remarks on what was declared without need."""
+    overlapping = {frozenset((one.part, one.other)) for one in matrices.overlaps.others}
+    bent = {frozenset((one.part, one.other)) for one in matrices.undercuts}
+    declared = product.declared
+    for kind, pairs, known, why in (
+        ("accept", declared.accept, overlapping, "they do not overlap"),
+        ("press", declared.press, overlapping, "they do not overlap"),
+        ("snap", declared.snap, bent, "one leaves the other without bending"),
+    ):
+        for pair in sorted(sorted(pair) for pair in pairs - known):
+            yield f"declared without need: {kind} {','.join(pair)}, since {why}"
+    for part in sorted(declared.flexible - {one.part for one in matrices.undercuts}):
+        yield f"declared without need: flexible {part}, since it leaves without bending"
 
 
 def _doubts(items: Sequence[str], matrices: AssemblyMatrices) -> list[str]:
@@ -136,7 +157,8 @@ def _doubts(items: Sequence[str], matrices: AssemblyMatrices) -> list[str]:
 
 
 def _fragile_contacts(matrices: AssemblyMatrices, steps: StepIndices) -> list[FragileDecision]:
-    names, limit = list(matrices.solids), BELOW_CAP * FRAGILE * matrices.tolerance
+    names = list(matrices.solids)
+    limit = BELOW_CAP * FRAGILE * matrices.tolerances.contact
     found = []
     for i, k in np.argwhere(np.triu(matrices.contact_margin < limit, 1)):
         contact = matrices.contact.copy()
@@ -175,95 +197,3 @@ def _changes(
         reachable_directions(contact, free, *indices) != reachable_directions(*now, *indices)
         for indices in steps
     )
-
-
-def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
-    """Return the evidence as plain lists, numbers and strings; lengths in metres."""
-    data: dict[str, Any] = asdict(evidence)
-    data["tolerance_m"] = data["tolerance"]
-    del data["tolerance"]
-    for thread in data["threads"]:
-        for name in ("diameter", "height", "length"):
-            thread[f"{name}_m"] = thread.pop(name)
-        thread["middle_m"] = list(thread.pop("p_AoT"))
-        thread["axis"] = list(thread["axis"])
-    for decision in data["fragile"]:
-        decision["margin_m"] = decision.pop("margin")
-    data["motions"] = [
-        {
-            "item": motion.item,
-            "direction": list(motion.freedom.direction),
-            "travel_m": None if motion.freedom.leaves else motion.freedom.travel,
-            "hits": motion.freedom.hits,
-        }
-        for motion in evidence.motions
-    ]
-    return data | {key: list(data[key]) for key in ("threads", "fragile", "remarks")}
-
-
-def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
-    """Return the evidence that ``evidence_to_dict`` described."""
-    threads = [
-        CadThread(
-            bolt=thread["bolt"],
-            nut=thread["nut"],
-            axis=tuple(thread["axis"]),
-            p_AoT=tuple(thread["middle_m"]),
-            diameter=thread["diameter_m"],
-            height=thread["height_m"],
-            length=thread["length_m"],
-        )
-        for thread in data["threads"]
-    ]
-    names = ("part", "other", "direction", "value", "decides")
-    fragile = [
-        FragileDecision(margin=decision["margin_m"], **{name: decision[name] for name in names})
-        for decision in data["fragile"]
-    ]
-    motions = []
-    for motion in data["motions"]:
-        x, y, z = motion["direction"]
-        travel = float("inf") if motion["travel_m"] is None else motion["travel_m"]
-        motions.append(ItemFreedom(motion["item"], Freedom((x, y, z), travel, motion["hits"])))
-    return Evidence(
-        data["tolerance_m"],
-        data["declared"],
-        tuple(threads),
-        tuple(fragile),
-        tuple(data["remarks"]),
-        tuple(motions),
-    )
-
-
-def evidence_text(evidence: Evidence) -> str:
-    """Return the evidence in lines for a terminal."""
-    source = "declared by the product" if evidence.declared else "by default"
-    lines = [f"Tolerance {1e3 * evidence.tolerance:.3g} mm, {source}."]
-    lines += [f"Note: {remark}" for remark in evidence.remarks]
-    lines += [
-        f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
-        f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
-        for thread in evidence.threads
-    ]
-    lines += [_fragile_text(decision) for decision in evidence.fragile if decision.decides]
-    for motion in evidence.motions:
-        along = f"{motion.item} along {_vector_text(motion.freedom.direction)}"
-        travel = f"{1e3 * motion.freedom.travel:.3g} mm, then {motion.freedom.hits}"
-        leaves = motion.freedom.leaves
-        lines.append(f"Free: {along} to infinity." if leaves else f"Local: {along} by {travel}.")
-    return "\n".join(lines)
-
-
-def _vector_text(vector: Sequence[float]) -> str:
-    x, y, z = (round(value, 6) + 0.0 for value in vector)  # Adding zero turns -0 into 0.
-    return f"({x:.3g}, {y:.3g}, {z:.3g})"
-
-
-def _fragile_text(decision: FragileDecision) -> str:
-    if decision.direction == "contact":
-        what = "touch" if decision.value else "do not touch"
-        claim = f"{decision.part} and {decision.other} {what}"
-    else:
-        what = "leaves" if decision.value else "does not leave"
-        claim = f"{decision.part} {what} {decision.other} along {decision.direction}"
-    return f"Warning: the plan depends on {1e3 * decision.margin:.2g} mm of tolerance: {claim}."

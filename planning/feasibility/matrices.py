@@ -11,7 +11,7 @@ P_t displaced along j, flips every sign and contradicts the paper's table.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -19,17 +19,13 @@ import numpy as np
 from cell.products.product import Product
 from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
-from planning.feasibility.contact import (
-    PER_CLEARANCE,
-    contact_matrix,
-    default_tolerance,
-    gap_matrix,
-    largest_tolerance,
-)
-from planning.feasibility.directions import DIRECTIONS
-from planning.feasibility.interference import Interference, interference
-from planning.feasibility.overlaps import without_overlaps
+from planning.feasibility.contact import contact_matrix
+from planning.feasibility.directions import DIRECTIONS, opposite
+from planning.feasibility.interference import Blocker, Interference, interference
+from planning.feasibility.overlaps import Overlap, Overlaps, find_overlaps, fitted_pair
 from planning.feasibility.solids import Solid, solids_of
+from planning.feasibility.tolerance import Tolerances, tolerances_of
+from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,20 +34,37 @@ class AssemblyMatrices:
 
     Attributes:
         solids: The n parts in the product frame, by name in matrix order.
-        tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
+        tolerances: What counts as contact, and what does not block.
         contact: (n, n) int, strictly upper triangular C.
         contact_margin: (n, n) float: change of the tolerance at which an entry of C flips [m],
             capped at ``FRAGILE`` times the tolerance.
         interference: The M_j with their margins and blockers.
-        threads: Screw threads that were recognised in the meshes.
+        overlaps: Threads, declared overlaps, and errors of the CAD.
+        undercuts: What declared snap fits and flexible parts bend over.
     """
 
     solids: Mapping[str, Solid]
-    tolerance: float
+    tolerances: Tolerances
     contact: np.ndarray
     contact_margin: np.ndarray
     interference: Interference
-    threads: tuple[CadThread, ...]
+    overlaps: Overlaps
+    undercuts: tuple[Undercut, ...] = ()
+
+    @property
+    def tolerance(self) -> float:
+        """Largest overlap that does not block a motion [m]."""
+        return self.tolerances.overlap
+
+    @property
+    def threads(self) -> tuple[CadThread, ...]:
+        """Screw threads that were recognised in the meshes."""
+        return self.overlaps.threads
+
+    @property
+    def errors(self) -> tuple[Overlap, ...]:
+        """Overlaps that are neither threads nor declared."""
+        return tuple(one for one in self.overlaps.others if not one.declared)
 
     def indices(self, names: Sequence[str]) -> list[int]:
         """Return the matrix indices of parts."""
@@ -66,54 +79,110 @@ def matrices_of(
 
     Args:
         product: Parts in assembled poses.
-        tolerance: See ``AssemblyMatrices`` [m]; None for the product's own, or one derived from its
-            sizes and clearances if it declares none.
+        tolerance: Largest gap that counts as contact and largest overlap that does not block [m];
+            None for the product's own, or those derived from its sizes and clearances if it
+            declares none.
         solids: The product's parts, if they have been built already.
-
-    Raises:
-        InputError: Parts overlap, and not as a bolt does in its thread.
     """
     solids = solids_of(product) if solids is None else solids
     declared = product.contact_tolerance if tolerance is None else tolerance
-    parts = list(solids.values())
-    reach = max(1.0 + FRAGILE, 1.0 / PER_CLEARANCE) * (declared or largest_tolerance(parts))
-    gaps = gap_matrix(parts, reach)
-    tolerance = declared or default_tolerance(parts, gaps)
-    leaving = interference(parts, tolerance)
+    source = "declared by the product" if tolerance is None else "as given"
+    parts, names = list(solids.values()), list(solids)
+    tolerances, gaps = tolerances_of(parts, declared, source)
+    leaving = interference(parts, tolerances.overlap)
     # Pairs that may overlap by more than the tolerance: their surfaces meet, and neither leaves the
     # other with a margin to spare. A layer of overlap between one and two tolerances thick is too
     # narrow to block across it, but only just.
-    sure = FRAGILE * tolerance * (1.0 - 1e-9)
+    sure = FRAGILE * tolerances.overlap * (1.0 - 1e-9)
     held = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
     suspect = (gaps == 0.0) & np.all(held, axis=0)
-    names = list(solids)
-    pairs = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
-    fitted, threads = without_overlaps(product, solids, tolerance, pairs)
-    for nut, name in enumerate(names):
-        if fitted[name] is not solids[name]:
-            others = np.flatnonzero(suspect[nut])
-            leaving = _updated(leaving, list(fitted.values()), nut, others, tolerance)
-    margin = np.minimum(np.abs(gaps - tolerance), FRAGILE * tolerance)
-    contact = contact_matrix(gaps, tolerance)
-    return AssemblyMatrices(solids, tolerance, contact, margin, leaving, threads)
+    suspects = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
+    overlaps = find_overlaps(product, solids, tolerances.overlap, suspects)
+    for pair in fitted_pairs(solids, overlaps, tolerances.overlap):
+        leaving = _redecided(leaving, names, pair, tolerances.overlap)
+    undercuts = tuple(_undercuts(product, solids, leaving, tolerances.overlap))
+    for one in undercuts:
+        i, k = names.index(one.part), names.index(one.other)
+        others = [k] if one.kind == "snap" else [n for n in range(len(names)) if n != i]
+        leaving = _freed(leaving, names, one.direction, i, others, tolerances.overlap)
+    contact = contact_matrix(gaps, tolerances.contact)
+    margin = np.minimum(np.abs(gaps - tolerances.contact), FRAGILE * tolerances.contact)
+    return AssemblyMatrices(solids, tolerances, contact, margin, leaving, overlaps, undercuts)
 
 
-def _updated(
-    leaving: Interference, fitted: Sequence[Solid], nut: int, others: np.ndarray, tolerance: float
+def fitted_pairs(
+    solids: Mapping[str, Solid], overlaps: Overlaps, tolerance: float
+) -> Iterator[tuple[Solid, Solid]]:
+    """Yield each pair with an overlap that is meant, its common volume cut out of one of the two.
+
+    Args:
+        solids: Parts by name.
+        overlaps: Of the product.
+        tolerance: Largest overlap that does not block [m].
+    """
+    threads = [(thread.bolt, thread.nut) for thread in overlaps.threads]
+    for bolt, nut in [*threads, *overlaps.screws]:
+        yield solids[bolt], solids[nut].without(solids[bolt])
+    for one in overlaps.others:
+        if one.declared:
+            yield fitted_pair(solids[one.part], solids[one.other], tolerance)
+
+
+def _redecided(
+    leaving: Interference, names: Sequence[str], pair: tuple[Solid, Solid], tolerance: float
 ) -> Interference:
-    """Recompute the entries of a nut whose threads have been cut, with the parts it may overlap."""
+    """Decide the entries of two parts anew, whose shapes have been fitted to each other."""
     free = {j: matrix.copy() for j, matrix in leaving.free.items()}
     margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
-    blockers = list(leaving.blockers)
+    own = interference(pair, tolerance)
+    i, k = (names.index(solid.name) for solid in pair)
+    for j in DIRECTIONS:
+        for values, new in ((free[j], own.free[j]), (margin[j], own.margin[j])):
+            values[i, k], values[k, i] = new[0, 1], new[1, 0]
+    both = {solid.name for solid in pair}
+    rest = [b for b in leaving.blockers if {b.moving, b.staying} != both]
+    return Interference(free, (*rest, *own.blockers), margin)
+
+
+def _undercuts(
+    product: Product, solids: Mapping[str, Solid], leaving: Interference, tolerance: float
+) -> Iterator[Undercut]:
+    """Yield what declared snap fits and flexible parts bend over, where anything is in the way."""
+    names = list(solids)
+    for part, other in (sorted(pair, key=names.index) for pair in product.declared.snap):
+        i, k = names.index(part), names.index(other)
+        if not any(leaving.free[j][i, k] for j in DIRECTIONS):
+            yield snap_direction(solids[part], solids[other], tolerance)
+    for part in (name for name in names if name in product.declared.flexible):
+        i = names.index(part)
+        others = [k for k in range(len(names)) if k != i]
+        free = {j: leaving.free[j][i, others] == 1 for j in DIRECTIONS}
+        if not any(row.all() for row in free.values()):
+            rest = [solids[names[k]] for k in others]
+            yield from stretch_directions(solids[part], rest, free, tolerance)
+
+
+def _freed(
+    leaving: Interference,
+    names: Sequence[str],
+    direction: str,
+    part: int,
+    others: Sequence[int],
+    tolerance: float,
+) -> Interference:
+    """Let a part leave others along a direction."""
+    free = {j: matrix.copy() for j, matrix in leaving.free.items()}
+    margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
     for other in others:
-        pair = interference([fitted[other], fitted[nut]], tolerance)
-        for j in DIRECTIONS:
-            for values, new in ((free[j], pair.free[j]), (margin[j], pair.margin[j])):
-                values[other, nut], values[nut, other] = new[0, 1], new[1, 0]
-        names = {fitted[other].name, fitted[nut].name}
-        blockers = [b for b in blockers if {b.moving, b.staying} != names]
-        blockers += pair.blockers
-    return Interference(free, tuple(blockers), margin)
+        for j, i, k in ((direction, part, other), (opposite(direction), other, part)):
+            free[j][i, k], margin[j][i, k] = 1, FRAGILE * tolerance
+
+    def freed(blocker: Blocker) -> bool:
+        i, k = names.index(blocker.moving), names.index(blocker.staying)
+        return bool(free[blocker.direction][i, k])
+
+    kept = tuple(blocker for blocker in leaving.blockers if not freed(blocker))
+    return Interference(free, kept, margin)
 
 
 def reachable_matrices(

@@ -1,82 +1,98 @@
-"""Input check before planning: parts of a product must not share volume.
+"""Common volume of parts: threads, what the user declared, and errors of the CAD.
 
-Solid parts cannot overlap, so an overlap is a modelling error, except in a thread: CAD often draws
-the hole at the tap drill's diameter and the bolt at the nominal one. That overlap is cut out of the
-part with the inner thread, so that the bolt touches it line to line and can leave along its axis. A
-thread is one that the product declares, or one that is recognised in the meshes (``cad_threads``).
+Rigid parts cannot overlap, but CAD draws some that do. A thread often comes as a hole at the tap
+drill's diameter with a bolt at the nominal one: a product declares it, or it is recognised in the
+meshes (``cad_threads``). A press fit, or an overlap to be ignored, is declared by the user. In
+these cases the common volume is cut out of one of the two, so that they touch line to line, before
+it is decided how they come apart. Any other overlap deeper than the tolerance is an error of poses
+or shapes; all of them are reported, and a plan with one of them is not feasible.
 """
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from itertools import combinations
+from dataclasses import dataclass
 
-from cell.errors import InputError
 from cell.products.product import Product
-from planning.feasibility.cad_threads import (
-    THREAD_HEIGHT_PER_PITCH,
-    CadThread,
-    find_thread,
-    thickness,
-)
-from planning.feasibility.solids import Solid, boxes_apart
+from planning.feasibility.cad_threads import THREAD_HEIGHT_PER_PITCH, CadThread, find_thread
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.interference import interference
+from planning.feasibility.overlap_depth import overlap_of
+from planning.feasibility.solids import Solid
 
 
-def overlap_depth(a: Solid, b: Solid) -> float:
-    """Return how thick the thickest piece of common volume is [m].
+@dataclass(frozen=True)
+class Overlap:
+    """Two parts that share more volume than the tolerance allows, other than in a thread.
 
-    Thickness is taken as 2 V / A: exact for a thin layer, which is what matters near the tolerance,
-    and of the right order (2/3 of the radius for a ball) for a gross overlap.
+    Attributes:
+        part: Name of one part.
+        other: Name of the other one.
+        depth: Where it is deepest [m]: see ``overlap_depth``.
+        p_AoD: That place in A [m].
+        volume: Common volume [m3].
+        declared: "press" or "accept", as the user declared it; "" if it is an error.
     """
-    if boxes_apart(a, b, 0.0):
-        return 0.0
-    pieces = (a.manifold ^ b.manifold).decompose()
-    return max((thickness(piece) for piece in pieces if piece.volume() > 0.0), default=0.0)
+
+    part: str
+    other: str
+    depth: float
+    p_AoD: tuple[float, float, float]
+    volume: float
+    declared: str = ""
 
 
-def without_overlaps(
+@dataclass(frozen=True)
+class Overlaps:
+    """Every overlap of a product, by what it is.
+
+    Attributes:
+        threads: Recognised in the meshes.
+        screws: (bolt, nut) of the declared screws whose thread is drawn as an overlap.
+        others: Declared ones and errors.
+    """
+
+    threads: tuple[CadThread, ...] = ()
+    screws: tuple[tuple[str, str], ...] = ()
+    others: tuple[Overlap, ...] = ()
+
+
+def find_overlaps(
     product: Product,
     solids: Mapping[str, Solid],
     tolerance: float,
-    suspects: Iterable[tuple[str, str]] | None = None,
-) -> tuple[dict[str, Solid], tuple[CadThread, ...]]:
-    """Return the solids with each bolt's thread cut out of the part it is driven into.
+    suspects: Iterable[tuple[str, str]],
+) -> Overlaps:
+    """Return the overlaps among pairs of parts that may have one.
 
     Args:
-        product: For its declared screws.
+        product: For its screws and for what was declared.
         solids: Parts by name.
-        tolerance: Thickness of overlap that does not count [m].
-        suspects: Pairs to check; all of them by default. Two parts of which one can leave the other
-            along some direction do not overlap.
-
-    Returns:
-        The solids, and the threads that were recognised.
-
-    Raises:
-        InputError: Two parts share a layer thicker than the tolerance, and it is not a thread.
+        tolerance: Depth of overlap that does not count [m].
+        suspects: The pairs. Two parts of which one can leave the other along some direction do not
+            overlap.
     """
-    fitted = dict(solids)
     threads: list[CadThread] = []
-    for a, b in combinations(solids, 2) if suspects is None else suspects:
-        depth = overlap_depth(solids[a], solids[b])
-        if depth <= tolerance:
+    screws: list[tuple[str, str]] = []
+    others: list[Overlap] = []
+    for a, b in suspects:
+        declared = product.declared.overlap_kind(a, b)
+        thread = None if declared else find_thread(solids[a], solids[b], tolerance)
+        if thread:
+            threads.append(thread)
             continue
-        thread = find_thread(solids[a], solids[b], tolerance)
-        recognised = (thread.bolt, thread.nut) if thread else None
-        bolt_and_nut = _declared(product, a, b, depth, tolerance) or recognised
-        if bolt_and_nut is None:
-            raise InputError(
-                f"Parts '{a}' and '{b}' overlap by about {1e3 * depth:.3g} mm, more than the "
-                f"contact tolerance of {1e3 * tolerance:.3g} mm, and not as a bolt does in its "
-                "thread: correct their poses or shapes, or raise the tolerance."
-            )
-        threads += [thread] if thread else []
-        bolt, nut = bolt_and_nut
-        fitted[nut] = fitted[nut].without(solids[bolt])
-    return fitted, tuple(threads)
+        found = overlap_of(solids[a], solids[b])
+        if found.depth <= tolerance:
+            continue
+        screw = _declared_screw(product, a, b, found.depth, tolerance)
+        if screw:
+            screws.append(screw)
+        else:
+            others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, declared))
+    return Overlaps(tuple(threads), tuple(screws), tuple(others))
 
 
-def _declared(
+def _declared_screw(
     product: Product, a: str, b: str, depth: float, tolerance: float
 ) -> tuple[str, str] | None:
     """Return (bolt, nut) if the product says that one of two parts is driven into the other."""
@@ -86,3 +102,27 @@ def _declared(
             deepest = THREAD_HEIGHT_PER_PITCH * screw.pitch + tolerance
             return (bolt, nut) if depth <= deepest else None
     return None
+
+
+def fitted_pair(part: Solid, other: Solid, tolerance: float) -> tuple[Solid, Solid]:
+    """Return two overlapping parts with their common volume cut out of one of them.
+
+    It is cut out of the one that then holds the other more tightly, as a hole holds a pin, but
+    does not lock it in; if that does not tell them apart, out of the larger one.
+
+    Args:
+        part: One part.
+        other: The other one.
+        tolerance: Largest overlap that does not block [m].
+    """
+    choices = []
+    for cut, pair in (
+        (part, (part.without(other), other)),
+        (other, (part, other.without(part))),
+    ):
+        if any(len(solid.faces) == 0 for solid in pair):  # It lay within the other altogether.
+            continue
+        free = interference(pair, tolerance).free
+        ways = sum(int(free[j][0, 1]) for j in DIRECTIONS)
+        choices.append((ways or len(DIRECTIONS), -cut.manifold.volume(), pair))
+    return min(choices, key=lambda one: one[:2])[2] if choices else (part, other)

@@ -83,18 +83,23 @@ class Solid:
 
     def proximity_of(self, which: np.ndarray) -> fcl.CollisionObject:
         """Return some of the part's faces, given by their indices, for distance queries."""
-        corners = self.triangles[which].reshape(-1, 3)
-        tree = fcl.BVHModel()
-        tree.beginModel(len(corners), len(which))
-        tree.addSubModel(corners, np.arange(len(corners)).reshape(-1, 3))
-        tree.endModel()
-        return fcl.CollisionObject(tree, fcl.Transform())
+        return surface_of(self.triangles[which])
 
     def without(self, other: Solid) -> Solid:
         """Return this part with the other's volume cut out; mass and p_AoG stay."""
         mesh = (self.manifold - other.manifold).to_mesh64()
         vertices = np.array(mesh.vert_properties)[:, :3]
         return Solid(self.name, vertices, np.array(mesh.tri_verts, int), self.mass, self.p_AoG)
+
+
+def surface_of(triangles: np.ndarray) -> fcl.CollisionObject:
+    """Return triangles (m, 3, 3) for distance queries."""
+    corners = triangles.reshape(-1, 3)
+    tree = fcl.BVHModel()
+    tree.beginModel(len(corners), len(triangles))
+    tree.addSubModel(corners, np.arange(len(corners)).reshape(-1, 3))
+    tree.endModel()
+    return fcl.CollisionObject(tree, fcl.Transform())
 
 
 def solid_of(part: Part) -> Solid:
