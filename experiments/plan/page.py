@@ -12,7 +12,7 @@ from experiments.plan.arrangement import exploded, step_arrangement
 from experiments.plan.drawn import DrawnProduct
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.scene import SceneItem, figure, picture
-from experiments.reporting.html_page import figures, page, pairs, section, table
+from experiments.reporting.html_page import page, pairs, section, table
 from experiments.reporting.output import write_text
 from experiments.reporting.render import rendering_problem
 from planning.assembly_plan.explain import blocker_text, step_texts, stop_text
@@ -180,12 +180,14 @@ def _matrices(plan: FixingPlan) -> str:
     contact = contact_map(plan.parts, plan.contact)
     free = direction_maps(plan.parts, plan.free, "M")
     reachable = direction_maps(plan.parts, plan.reachable, "W")
-    return figures(
-        [
-            ("C: blue where two parts touch", contact),
-            ("M: blue where the row's part leaves the column's part along the direction", free),
-            ("W: blue where they also touch: the row's part can be mated along it", reachable),
-        ]
+    maps = {
+        "C: blue where two parts touch": contact,
+        "M: blue where the row's part leaves the column's part along the direction": free,
+        "W: blue where they also touch: the row's part can be mated along it": reachable,
+    }
+    return "".join(
+        f"<figure>{svg}<figcaption>{escape(caption)}</figcaption></figure>"
+        for caption, svg in maps.items()
     )
 
 
