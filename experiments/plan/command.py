@@ -28,10 +28,13 @@ from planning.feasibility.bolt_remark import bolt_remarks
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence_format import evidence_text
 from planning.fixture_analysis.candidate import Choice, FixtureSetup
-from planning.fixture_analysis.rule import choices_text, choices_to_list, general_rule
+from planning.fixture_analysis.rule import (
+    choices_text,
+    choices_to_list,
+    general_rule,
+    unheld_text,
+)
 from planning.ordering.advice_format import advice_text
-
-MIN_WIDTH = 100  # Characters: enough for the step table, also if the output is not a terminal.
 
 
 def run_plan(
@@ -76,7 +79,6 @@ def run_plan(
     described = replace(described, declared=declared)
     config = config or CellConfig()
     console = Console(highlight=False)
-    console.width = max(console.width, MIN_WIDTH)
     with console.status("Matrices, steps and orders ..."):
         fixing = plan(
             described,
@@ -105,7 +107,9 @@ def run_plan(
     if fixing.orders:
         seconds = {"orders": fixing.orders.seconds} | seconds
     further = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
-    _print_lines(console, [f"Planned in {fixing.seconds:.2f} s; {further}."])
+    lines = [f"Planned in {fixing.seconds:.2f} s; {further}."]
+    lines += [unheld_text(choices)] if fixing.feasible and unheld_text(choices) else []
+    _print_lines(console, lines)
     return 0 if fixing.feasible else 1
 
 

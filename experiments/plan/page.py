@@ -15,7 +15,7 @@ from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import page, pairs, section, table
 from experiments.reporting.output import write_text
 from experiments.reporting.render import rendering_problem
-from planning.assembly_plan.explain import blocker_text, step_texts, stop_text
+from planning.assembly_plan.explain import blocker_text, overlap_text, step_texts, stop_text
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import opposite
@@ -23,6 +23,7 @@ from planning.feasibility.evidence_format import evidence_text
 from planning.feasibility.order import subassembly_name
 from planning.fixture_analysis.candidate import CRITERIA, Choice, FixtureSetup
 from planning.fixture_analysis.footprint import USUAL_DEPTH
+from planning.fixture_analysis.rule import unheld_text
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.advice_format import advice_text, constraint_text
 
@@ -58,7 +59,7 @@ def write_page(
         apart = _figure(shown, "Each item moved out against its mating direction")
     missing = [f"No pictures: {problem}."] if problem else []
     sections = [
-        _summary(plan, [*notes, *missing]),
+        _summary(plan, unheld_text(choices), [*notes, *missing]),
         section("Orders", _orders(plan.orders)),
         section("Steps", _steps(drawn, plan, choices, setup)),
         section("Exploded view", apart),
@@ -71,16 +72,18 @@ def write_page(
     return time.perf_counter() - started
 
 
-def _summary(plan: FixingPlan, notes: Sequence[str]) -> str:
+def _summary(plan: FixingPlan, unheld: str, notes: Sequence[str]) -> str:
     facts = {
         "order": ", ".join(plan.order),
         "parts": f"{len(plan.parts)}",
         "up on the jig": plan.steps[0].up if plan.steps else "",
         "planned in": f"{plan.seconds:.3f} s",
     }
-    verdict = "success" if plan.feasible else "failure"
-    words = "feasible" if plan.feasible else "infeasible"
-    stop = f"<pre>{escape(stop_text(plan))}</pre>" if plan.stop else ""
+    verdict, words = "failure", "infeasible"
+    if plan.feasible:
+        verdict, words = ("warning", "feasible by geometry") if unheld else ("success", "feasible")
+    reasons = "\n".join(filter(None, [stop_text(plan), overlap_text(plan), unheld]))
+    stop = f"<pre>{escape(reasons)}</pre>" if reasons else ""
     paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
     return (
         f"<h1>{escape(plan.product)}: plan</h1>\n"

@@ -20,16 +20,24 @@ MOST_LISTED = 20  # Overlaps; the file holds all.
 
 
 def step_table(plan: FixingPlan) -> Table:
-    """Return a table of the steps: incoming item, A by direction, posture, fixed part and CoG."""
-    table = Table(title=f"{plan.product}: {', '.join(plan.order)}", title_justify="left")
-    for heading in ("step", "incoming", *DIRECTIONS, "posture / fixed", "up"):
-        table.add_column(heading)
-    table.add_column(escape("CoG height [mm]"), justify="right")
+    """Return a table of the steps: incoming item, A by direction, posture, fixed part and CoG.
+
+    Names are folded where the terminal is too narrow for them; 80 columns do.
+    """
+    title = f"{plan.product}: {', '.join(plan.order)}"
+    if plan.steps:
+        title += f"; {plan.steps[0].up} up"
+    table = Table(title=escape(title), title_justify="left")
+    table.add_column("", justify="right")
+    table.add_column("incoming", overflow="fold")
+    table.add_column(" ".join(DIRECTIONS), no_wrap=True)
+    table.add_column("posture / fixed", overflow="fold")
+    table.add_column(escape("CoG [mm]"), justify="right", no_wrap=True)
     for number, step in enumerate(plan.steps, start=1):
-        digits = [str(step.directions[j]) for j in DIRECTIONS]
+        digits = "  ".join(f"{step.directions[j]:>1}" for j in DIRECTIONS)
         chosen = f"{step.posture} / {step.fixed_part}"
         height = f"{1e3 * step.cog_height:.1f}"
-        table.add_row(str(number), step.item, *digits, chosen, step.up, height)
+        table.add_row(str(number), escape(step.item), f" {digits}", escape(chosen), height)
     return table
 
 
