@@ -11,7 +11,7 @@ import pytest
 from manifold3d import Manifold
 from pydrake.math import RigidTransform, RotationMatrix
 from test_interference import random_shape
-from tiny_products import bolted, box, peg_in_hole, product_of, rod, stack_of_three, to_trimesh
+from tiny_products import bolted, box, peg_in_hole, product_of, stack_of_three, to_trimesh
 
 import cell.cad.motor_unit as cad
 from cell.cad import shapes
@@ -165,25 +165,6 @@ def test_a_plan_with_margins_reports_no_fragile_decision():
     evidence = plan(stack_of_three(), ("plate_0", "plate_1", "plate_2")).evidence
     assert evidence is not None and evidence.fragile == ()
     assert evidence_text(evidence) == "Tolerance 0.05 mm, by default."
-
-
-@pytest.mark.parametrize(
-    ("peg", "expected"), [(10.0, 0.05), (9.9, 0.05 * 2 / 3), (9.7, 0.05), (9.996, 0.05)]
-)
-def test_default_tolerance_is_below_the_smallest_clearance(peg, expected):
-    """A hanging peg with 0, 0.05, 0.15 and 0.002 mm of play; the last is rounding, not play."""
-    ring = rod(30, 0, 10, 96) - rod(10, -5, 15, 96)
-    matrices = matrices_of(product_of({"ring": ring, "peg": rod(peg, -5, 15, 96)}))
-    assert matrices.tolerance == pytest.approx(1e-3 * expected, rel=0.02)
-
-
-@pytest.mark.parametrize(("scale", "expected"), [(1.0, 5e-5), (10.0, 5e-5), (0.1, 2.5e-5)])
-def test_default_tolerance_follows_small_parts(scale, expected):
-    cubes = {
-        "low": box((50 * scale,) * 3, (0, 0, 0)),
-        "high": box((50 * scale,) * 3, (0, 0, 50 * scale)),
-    }
-    assert matrices_of(product_of(cubes)).tolerance == pytest.approx(expected)
 
 
 def choices(fixing: FixingPlan) -> list[tuple[str, str]]:

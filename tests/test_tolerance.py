@@ -42,11 +42,51 @@ def test_a_connected_product_keeps_its_clearances():
     assert matrices.tolerances.contact == matrices.tolerances.overlap == 5e-5
 
 
-def test_a_stray_part_has_no_say():
-    """A tiny cube far away would ask for 0.01 mm."""
+@pytest.mark.parametrize(
+    ("peg", "expected"), [(10.0, 0.05), (9.9, 0.05 * 2 / 3), (9.7, 0.05), (9.996, 0.05)]
+)
+def test_contact_is_below_the_smallest_clearance(peg, expected):
+    """Play of 0, 0.05, 0.15 and 0.002 mm between two parts on a plate; the last is rounding."""
+    shapes = {"plate": rod(40, -5, 0, 96), "peg": rod(peg, 0, 15, 96)}
+    shapes["ring"] = rod(30, 0, 10, 96) - rod(10, -5, 15, 96)
+    tolerances = matrices_of(product_of(shapes)).tolerances
+    assert tolerances.contact == pytest.approx(1e-3 * expected, rel=0.02)
+    assert tolerances.overlap == 5e-5
+
+
+@pytest.mark.parametrize(("scale", "expected"), [(1.0, 5e-5), (10.0, 5e-5), (0.1, 2.5e-5)])
+def test_small_parts_have_smaller_tolerances(scale, expected):
+    size = 50 * scale
+    cubes = {"low": box((size,) * 3, (0, 0, 0)), "high": box((size,) * 3, (0, 0, size))}
+    assert matrices_of(product_of(cubes)).tolerance == pytest.approx(expected)
+
+
+def test_a_small_part_has_no_say_for_others():
+    """A cube of 2 mm on the plate asks for a fifth of the tolerance, a stray one likewise."""
     blocks = {"plate": box((40, 40, 5), (-20, -20, 0)), "block": box((10, 10, 10), (-5, -5, 5))}
-    stray = blocks | {"stray": box((2, 2, 2), (100, 0, 0))}
-    assert matrices_of(product_of(stray)).tolerances == matrices_of(product_of(blocks)).tolerances
+    small = {"cube": box((2, 2, 2), (10, 0, 5)), "stray": box((2, 2, 2), (100, 0, 0))}
+    tolerances = matrices_of(product_of(blocks | small)).tolerances
+    assert tolerances.overlap_of("plate", "block") == 5e-5
+    assert tolerances.overlap_of("plate", "cube") == tolerances.small["stray"]
+    assert 5e-6 < tolerances.small["stray"] <= 1e-5
+
+
+@pytest.mark.parametrize("thickness", [0.06, 0.1])
+def test_thin_parts_block_edge_on(thickness):
+    """A foil in a tray stays between its walls, though it is thinner than two usual tolerances."""
+    tray = box((40, 40, 5), (-20, -20, 0)) - box((30, 30, 5), (-15, -15, 2))
+    foil = box((30, 30, thickness), (-15, -15, 2))
+    free = matrices_of(product_of({"tray": tray, "foil": foil})).interference.free
+    assert [j for j in free if free[j][1, 0]] == ["+z"]
+
+
+def test_a_thin_wire_blocks():
+    """A locking wire of 0.06 mm through a pin and its housing."""
+    wire = rod(0.06, -20, 20, 12).rotate([0, 90, 0])
+    block = box((30, 30, 20), (-15, -15, -10)) - rod(10, -11, 11, 64) - wire
+    shapes = {"block": block, "pin": rod(10, -9, 9, 64) - wire, "wire": wire}
+    free = matrices_of(product_of(shapes)).interference.free
+    assert not free["+z"][1, 2] and not free["+z"][2, 0]
 
 
 def test_the_loosest_joint_decides():

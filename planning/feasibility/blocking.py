@@ -59,17 +59,21 @@ class Decision:
     margin: float
 
 
-def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, int], Decision]:
+def decisions(
+    views: Sequence[Envelope], tolerance: float, wanted: np.ndarray | None = None
+) -> dict[tuple[int, int], Decision]:
     """Return a decision for each ordered pair (moving, stationary) whose boxes are in the way.
 
     Args:
-        views: The parts' envelopes along one axis.
+        views: The n parts' envelopes along one axis.
         tolerance: Height of overlap and radius of the region that do not count [m].
+        wanted: (n, n) bool: pairs to decide; None for all.
 
     Pairs left out are free, by a margin of at least ``FRAGILE`` times the tolerance.
     """
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
+    pairs = pairs if wanted is None else pairs[wanted[pairs[:, 0], pairs[:, 1]]]
     hits = _wide_hits(views, pairs, more)
     hits |= _probed(views, pairs, hits, more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}

@@ -116,12 +116,12 @@ def gap_matrix(
     return gaps
 
 
-def contact_matrix(gaps: np.ndarray, tolerance: float) -> np.ndarray:
+def contact_matrix(gaps: np.ndarray, tolerance: float | np.ndarray) -> np.ndarray:
     """Return C of the paper.
 
     Args:
         gaps: (n, n) as ``gap_matrix`` returns them [m].
-        tolerance: Gap up to which two parts count as touching [m].
+        tolerance: Gap up to which two parts count as touching [m]; one for all, or (n, n).
 
     Returns:
         (n, n) int, strictly upper triangular: C[i, k] = 1 if i < k and part i touches part k. Kept

@@ -119,7 +119,7 @@ def _item_freedoms(
     matrices: AssemblyMatrices, steps: Sequence[FixingStep | Stop]
 ) -> Iterator[ItemFreedom]:
     solids = dict(matrices.solids)
-    for fitted in fitted_pairs(solids, matrices.overlaps, matrices.tolerance):
+    for fitted in fitted_pairs(solids, matrices.overlaps, matrices.tolerances):
         solids |= {solid.name: solid for solid in fitted}
     for step in steps:
         incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
@@ -158,7 +158,7 @@ def _doubts(items: Sequence[str], matrices: AssemblyMatrices) -> list[str]:
 
 def _fragile_contacts(matrices: AssemblyMatrices, steps: StepIndices) -> list[FragileDecision]:
     names = list(matrices.solids)
-    limit = BELOW_CAP * FRAGILE * matrices.tolerances.contact
+    limit = BELOW_CAP * FRAGILE * matrices.tolerances.contacts(names)
     found = []
     for i, k in np.argwhere(np.triu(matrices.contact_margin < limit, 1)):
         contact = matrices.contact.copy()
@@ -170,8 +170,8 @@ def _fragile_contacts(matrices: AssemblyMatrices, steps: StepIndices) -> list[Fr
 
 
 def _fragile_motions(matrices: AssemblyMatrices, steps: StepIndices) -> list[FragileDecision]:
-    names, limit = list(matrices.solids), BELOW_CAP * FRAGILE * matrices.tolerance
-    leaving = matrices.interference
+    names, leaving = list(matrices.solids), matrices.interference
+    limit = BELOW_CAP * FRAGILE * matrices.tolerances.overlaps(names)
     found = []
     for j in ("+x", "+y", "+z"):
         for i, k in np.argwhere(leaving.margin[j] < limit):

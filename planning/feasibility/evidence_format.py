@@ -13,6 +13,8 @@ from planning.feasibility.overlaps import Overlap
 from planning.feasibility.tolerance import Tolerances
 from planning.feasibility.undercut import Undercut
 
+MOST_SMALL = 5  # Parts listed with a tolerance of their own.
+
 
 def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     """Return the evidence as plain lists, numbers and strings; lengths in metres."""
@@ -21,6 +23,7 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     data["tolerance_m"] = tolerances["overlap"]
     data["contact_tolerance_m"] = tolerances["contact"]
     data["tolerance_source"] = tolerances["source"]
+    data["small_parts_m"] = tolerances["small"]
     data["overlaps"] = [
         {
             "parts": [one.part, one.other],
@@ -89,7 +92,12 @@ def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
         for one in data["undercuts"]
     ]
     return Evidence(
-        Tolerances(data["contact_tolerance_m"], data["tolerance_m"], data["tolerance_source"]),
+        Tolerances(
+            data["contact_tolerance_m"],
+            data["tolerance_m"],
+            data["tolerance_source"],
+            data["small_parts_m"],
+        ),
         tuple(threads),
         tuple(overlaps),
         tuple(undercuts),
@@ -103,6 +111,10 @@ def evidence_text(evidence: Evidence) -> str:
     """Return the evidence in lines for a terminal."""
     tolerances = evidence.tolerances
     lines = [f"Tolerance {1e3 * tolerances.overlap:.3g} mm, {tolerances.source}."]
+    if tolerances.contact != tolerances.overlap:
+        lines.append(f"Gaps of up to {1e3 * tolerances.contact:.3g} mm count as contact.")
+    if tolerances.small:
+        lines.append(f"Less for small or thin parts: {_small_text(tolerances.small)}.")
     lines += [f"Note: {remark}" for remark in evidence.remarks]
     lines += [
         f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
@@ -122,6 +134,14 @@ def evidence_text(evidence: Evidence) -> str:
         leaves = motion.freedom.leaves
         lines.append(f"Free: {along} to infinity." if leaves else f"Local: {along} by {travel}.")
     return "\n".join(lines)
+
+
+def _small_text(small: Mapping[str, float]) -> str:
+    """Return the smallest tolerances with their parts, in millimetres."""
+    order = sorted(small, key=small.__getitem__)
+    listed = ", ".join(f"{1e3 * small[name]:.3g} mm for {name}" for name in order[:MOST_SMALL])
+    more = len(order) - MOST_SMALL
+    return f"{listed}, and {more} more" if more > 0 else listed
 
 
 def _declared_text(one: Overlap) -> str:

@@ -74,21 +74,31 @@ class Interference:
     margin: Mapping[str, np.ndarray]
 
 
-def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> Interference:
-    """Return the six matrices M_j of n parts in matrix order; the tolerance is in [m]."""
+def interference(
+    solids: Sequence[Solid], tolerance: float | np.ndarray = FIT_TOLERANCE
+) -> Interference:
+    """Return the six matrices M_j of n parts in matrix order.
+
+    Args:
+        solids: The parts.
+        tolerance: Height of overlap and radius of the region that do not count [m]; one for all, or
+            (n, n), symmetric, one per pair.
+    """
     count = len(solids)
+    tolerances = np.broadcast_to(tolerance, (count, count))
     free = {j: 1 - np.eye(count, dtype=int) for j in DIRECTIONS}
-    margin = {j: np.full((count, count), FRAGILE * tolerance) for j in DIRECTIONS}
+    margin = {j: FRAGILE * tolerances for j in DIRECTIONS}
     blockers = []
     for forward in ("+x", "+y", "+z"):
         views = [envelope(solid, axis_index(forward)) for solid in solids]
-        decided = decisions(views, tolerance)
-        for (i, k), decision in decided.items():
-            blocked = decision.point is not None
-            margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
-            free[forward][i, k] = free[opposite(forward)][k, i] = int(not blocked)
-        for hit in _evidence(views, forward, decided, tolerance):
-            blockers += [hit, hit.reversed()]
+        for level in np.unique(tolerances):
+            decided = decisions(views, float(level), tolerances == level)
+            for (i, k), decision in decided.items():
+                blocked = decision.point is not None
+                margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
+                free[forward][i, k] = free[opposite(forward)][k, i] = int(not blocked)
+            for hit in _evidence(views, forward, decided, float(level)):
+                blockers += [hit, hit.reversed()]
     return Interference(free, tuple(blockers), margin)
 
 

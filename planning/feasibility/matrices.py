@@ -53,7 +53,7 @@ class AssemblyMatrices:
 
     @property
     def tolerance(self) -> float:
-        """Largest overlap that does not block a motion [m]."""
+        """Largest overlap that does not block a motion [m]; less for small parts."""
         return self.tolerances.overlap
 
     @property
@@ -89,52 +89,54 @@ def matrices_of(
     source = "declared by the product" if tolerance is None else "as given"
     parts, names = list(solids.values()), list(solids)
     tolerances, gaps = tolerances_of(parts, declared, source)
-    leaving = interference(parts, tolerances.overlap)
+    overlap, touch = tolerances.overlaps(names), tolerances.contacts(names)
+    leaving = interference(parts, overlap)
     # Pairs that may overlap by more than the tolerance: their surfaces meet, and neither leaves the
     # other with a margin to spare. A layer of overlap between one and two tolerances thick is too
     # narrow to block across it, but only just.
-    sure = FRAGILE * tolerances.overlap * (1.0 - 1e-9)
+    sure = FRAGILE * overlap * (1.0 - 1e-9)
     held = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
     suspect = (gaps == 0.0) & np.all(held, axis=0)
     suspects = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
-    overlaps = find_overlaps(product, solids, tolerances.overlap, suspects)
-    for pair in fitted_pairs(solids, overlaps, tolerances.overlap):
-        leaving = _redecided(leaving, names, pair, tolerances.overlap)
+    overlaps = find_overlaps(product, solids, tolerances, suspects)
+    for pair in fitted_pairs(solids, overlaps, tolerances):
+        leaving = _redecided(leaving, names, pair, tolerances)
     undercuts = tuple(_undercuts(product, solids, leaving, tolerances.overlap))
     for one in undercuts:
         i, k = names.index(one.part), names.index(one.other)
         others = [k] if one.kind == "snap" else [n for n in range(len(names)) if n != i]
         leaving = _freed(leaving, names, one.direction, i, others, tolerances.overlap)
-    contact = contact_matrix(gaps, tolerances.contact)
-    margin = np.minimum(np.abs(gaps - tolerances.contact), FRAGILE * tolerances.contact)
+    contact = contact_matrix(gaps, touch)
+    margin = np.minimum(np.abs(gaps - touch), FRAGILE * touch)
     return AssemblyMatrices(solids, tolerances, contact, margin, leaving, overlaps, undercuts)
 
 
 def fitted_pairs(
-    solids: Mapping[str, Solid], overlaps: Overlaps, tolerance: float
+    solids: Mapping[str, Solid], overlaps: Overlaps, tolerances: Tolerances
 ) -> Iterator[tuple[Solid, Solid]]:
     """Yield each pair with an overlap that is meant, its common volume cut out of one of the two.
 
     Args:
         solids: Parts by name.
         overlaps: Of the product.
-        tolerance: Largest overlap that does not block [m].
+        tolerances: Of the product.
     """
     threads = [(thread.bolt, thread.nut) for thread in overlaps.threads]
     for bolt, nut in [*threads, *overlaps.screws]:
         yield solids[bolt], solids[nut].without(solids[bolt])
     for one in overlaps.others:
         if one.declared:
+            tolerance = tolerances.overlap_of(one.part, one.other)
             yield fitted_pair(solids[one.part], solids[one.other], tolerance)
 
 
 def _redecided(
-    leaving: Interference, names: Sequence[str], pair: tuple[Solid, Solid], tolerance: float
+    leaving: Interference, names: Sequence[str], pair: tuple[Solid, Solid], tolerances: Tolerances
 ) -> Interference:
     """Decide the entries of two parts anew, whose shapes have been fitted to each other."""
     free = {j: matrix.copy() for j, matrix in leaving.free.items()}
     margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
-    own = interference(pair, tolerance)
+    own = interference(pair, tolerances.overlap_of(*(solid.name for solid in pair)))
     i, k = (names.index(solid.name) for solid in pair)
     for j in DIRECTIONS:
         for values, new in ((free[j], own.free[j]), (margin[j], own.margin[j])):

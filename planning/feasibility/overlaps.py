@@ -19,6 +19,7 @@ from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import interference
 from planning.feasibility.overlap_depth import overlap_of
 from planning.feasibility.solids import Solid
+from planning.feasibility.tolerance import Tolerances
 
 
 @dataclass(frozen=True)
@@ -60,7 +61,7 @@ class Overlaps:
 def find_overlaps(
     product: Product,
     solids: Mapping[str, Solid],
-    tolerance: float,
+    tolerances: Tolerances,
     suspects: Iterable[tuple[str, str]],
 ) -> Overlaps:
     """Return the overlaps among pairs of parts that may have one.
@@ -68,7 +69,7 @@ def find_overlaps(
     Args:
         product: For its screws and for what was declared.
         solids: Parts by name.
-        tolerance: Depth of overlap that does not count [m].
+        tolerances: Of the product.
         suspects: The pairs. Two parts of which one can leave the other along some direction do not
             overlap.
     """
@@ -76,6 +77,7 @@ def find_overlaps(
     screws: list[tuple[str, str]] = []
     others: list[Overlap] = []
     for a, b in suspects:
+        tolerance = tolerances.overlap_of(a, b)
         declared = product.declared.overlap_kind(a, b)
         thread = None if declared else find_thread(solids[a], solids[b], tolerance)
         if thread:

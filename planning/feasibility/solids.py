@@ -67,6 +67,13 @@ class Solid:
         return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
 
     @cached_property
+    def thickness(self) -> float:
+        """2 V / A [m]: exact for a sheet, the radius for a wire, the wall's for a tube."""
+        a, b, c = (self.triangles[:, corner] for corner in range(3))
+        volume = float(np.einsum("ij,ij->", a, np.cross(b, c))) / 6.0
+        return 4.0 * abs(volume) / float(np.linalg.norm(self.doubled_areas, axis=1).sum())
+
+    @cached_property
     def manifold(self) -> manifold3d.Manifold:
         """The part for boolean operations."""
         mesh = manifold3d.Mesh64(self.vertices, self.faces.astype(np.uint64))

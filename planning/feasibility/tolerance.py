@@ -2,19 +2,19 @@
 
 A user may give one length for both, and a product may declare it. Otherwise they are derived.
 
-The overlap is 0.05 mm, above the sagitta and the rounding of typical meshes; less for small parts;
-and less than the smallest clearance. A part that lies apart from all others has no say in it.
+The overlap is 0.05 mm, above the sagitta and the rounding of typical meshes; less between two parts
+of which one is small or thin, and for these two alone.
 
-The gap that counts as contact is the same where it connects the product, so that a part with play
-does not touch the wall of its hole. Where it leaves the product in pieces, as in prints, whose
-parts have a clearance all round, it is raised to the smallest gap at which the pieces hang
-together, if that is plausible as the clearance of a fit. The overlap stays as it is.
+The gap that counts as contact is below the smallest clearance, so that a part with play does not
+touch the wall of its hole. Where that leaves the product in pieces, as in prints, whose parts have
+a clearance all round, it is raised to the smallest gap at which the pieces hang together, if that
+is plausible as the clearance of a fit. The overlap stays as it is.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from scipy.sparse import csr_array
@@ -25,9 +25,10 @@ from planning.feasibility.contact import gap_matrix
 from planning.feasibility.solids import Solid
 
 USUAL = 5e-5  # [m] [A] Seven times the sagitta of a fine mesh (7 um: r 6, n 64).
-PER_SIZE = 1.0 / 200.0  # [A] Of the smallest part's length: 0.05 mm for a screw of 10 mm.
+PER_SIZE = 1.0 / 200.0  # [A] Of a part's length: 0.05 mm for a screw of 10 mm.
+PER_THICKNESS = 0.4  # [A] Of a part's thickness: what is 2.5 tolerances thick blocks edge on.
 PER_CLEARANCE = 2.0 / 3.0  # [A] Leaves a third of the clearance as margin.
-LINE_TO_LINE = 0.2  # [A] Of the tolerance: gaps up to this are rounding or sagitta, not clearance.
+LINE_TO_LINE = 0.2  # [A] Of the overlap: gaps up to this are rounding or sagitta, not clearance.
 
 LARGEST_FIT = 5e-4
 """[m] [A] largest clearance between parts that are meant to hang together: prints have 0.2 to 0.3
@@ -44,11 +45,30 @@ class Tolerances:
         contact: Largest gap that counts as contact [m].
         overlap: Largest overlap that does not block a motion [m].
         source: Where they are from, in words.
+        small: Overlap of each part that is too small or thin for the usual one [m], by name; it
+            holds for every pair with this part.
     """
 
     contact: float
     overlap: float
     source: str
+    small: Mapping[str, float] = field(default_factory=dict)
+
+    def overlap_of(self, part: str, other: str) -> float:
+        """Return the largest overlap of two parts that does not block a motion [m]."""
+        return min(self.small.get(part, self.overlap), self.small.get(other, self.overlap))
+
+    def overlaps(self, names: Sequence[str]) -> np.ndarray:
+        """Return the same for all pairs of n parts, (n, n) [m]."""
+        own = np.array([self.small.get(name, self.overlap) for name in names])
+        return np.minimum.outer(own, own)
+
+    def contacts(self, names: Sequence[str]) -> np.ndarray:
+        """Return the largest gap that counts as contact for all pairs of n parts, (n, n) [m]."""
+        pairs = self.overlaps(names)
+        if self.contact > self.overlap:  # Raised to what holds the product together.
+            return np.full_like(pairs, self.contact)
+        return np.minimum(self.contact, pairs)
 
 
 def tolerances_of(
@@ -68,50 +88,56 @@ def tolerances_of(
     if given is not None:
         return Tolerances(given, given, source), gap_matrix(solids, (1.0 + FRAGILE) * given)
     gaps = gap_matrix(solids, (1.0 + FRAGILE) * USUAL)
-    apart = _pieces(gaps, (1.0 + FRAGILE) * USUAL)
-    if apart.max() > 0:
-        gaps = np.minimum(gaps, gap_matrix(solids, LARGEST_FIT, apart[:, None] != apart))
-    overlap, source = _overlap(solids, gaps)
-    if not _pieces(gaps, overlap).any():
-        return Tolerances(overlap, overlap, source), gaps
+    tolerances = _derived(solids, gaps)
+    pieces = _pieces(gaps <= tolerances.contacts([solid.name for solid in solids]))
+    if not pieces.any():
+        return tolerances, gaps
+    wide = np.minimum(gaps, gap_matrix(solids, LARGEST_FIT, pieces[:, None] != pieces))
     # Edges of length 0 would be none: contacts are set to the smallest length there is.
-    edges = np.where(np.isfinite(gaps), np.maximum(gaps, 1e-12), 0.0)
-    tree = minimum_spanning_tree(csr_array(edges))
-    largest = float(tree.max()) if tree.nnz else 0.0
-    if largest <= overlap:
-        return Tolerances(overlap, overlap, source), gaps
-    i, k = (int(index) for index in np.argwhere(tree.toarray() == largest)[0])
-    found = (
-        f"{source}; contact up to {1e3 * PER_FIT * largest:.3g} mm, since the product hangs "
-        f"together only at a clearance of {1e3 * largest:.3g} mm ({solids[i].name}, "
-        f"{solids[k].name})"
+    edges = np.where(np.isfinite(wide), np.maximum(wide, 1e-12), 0.0)
+    tree = minimum_spanning_tree(csr_array(edges)).toarray()
+    return _raised(tolerances, solids, gaps, tree) if tree.max() > 0.0 else (tolerances, gaps)
+
+
+def _raised(
+    tolerances: Tolerances, solids: Sequence[Solid], gaps: np.ndarray, tree: np.ndarray
+) -> tuple[Tolerances, np.ndarray]:
+    """Raise the contact tolerance to the longest edge of the tree that connects the parts."""
+    longest = float(tree.max())
+    if longest <= tolerances.contact:
+        return tolerances, gaps
+    i, k = (int(index) for index in np.argwhere(tree == longest)[0])
+    source = (
+        f"{tolerances.source}; the product hangs together only at a clearance of "
+        f"{1e3 * longest:.3g} mm ({solids[i].name}, {solids[k].name})"
     )
-    contact = PER_FIT * largest
-    return Tolerances(contact, overlap, found), gap_matrix(solids, (1.0 + FRAGILE) * contact)
+    contact = PER_FIT * longest
+    reach = (1.0 + FRAGILE) * contact
+    return replace(tolerances, contact=contact, source=source), gap_matrix(solids, reach)
 
 
-def _pieces(gaps: np.ndarray, tolerance: float) -> np.ndarray:
+def _pieces(touching: np.ndarray) -> np.ndarray:
     """Return, per part, the number (n,) of the connected piece that it belongs to."""
-    return connected_components(csr_array(gaps <= tolerance), directed=False)[1]
+    return connected_components(csr_array(touching), directed=False)[1]
 
 
-def _overlap(solids: Sequence[Solid], gaps: np.ndarray) -> tuple[float, str]:
-    """Return the tolerance on overlaps [m], from the sizes of parts and clearances, and why."""
-    near = np.isfinite(gaps.min(axis=1))
-    connected = [solid for solid, has in zip(solids, near, strict=True) if has] or solids
-    smallest = min(connected, key=_length)
-    largest = min(USUAL, PER_SIZE * _length(smallest))
-    clearances = np.where(gaps > LINE_TO_LINE * largest, gaps, np.inf)
-    least = float(clearances.min())
-    if PER_CLEARANCE * least < largest:
-        i, k = (int(index) for index in np.argwhere(clearances == least)[0])
-        names = f"{solids[i].name}, {solids[k].name}"
-        reason = f"two thirds of the smallest clearance, {1e3 * least:.3g} mm ({names})"
-        return PER_CLEARANCE * least, f"derived: {reason}"
-    if largest < USUAL:
-        return largest, f"derived: 1/200 of the smallest part, {smallest.name}"
-    return largest, "by default"
+def _derived(solids: Sequence[Solid], gaps: np.ndarray) -> Tolerances:
+    """Return the tolerances that follow from sizes and clearances."""
+    overlap = {solid.name: _overlap(solid) for solid in solids}
+    most = max(overlap.values())
+    small = {name: value for name, value in overlap.items() if value < most}
+    tolerances = Tolerances(most, most, "by default", small)
+    pairs = tolerances.overlaps(list(overlap))
+    clearance = float(np.min(gaps[gaps > LINE_TO_LINE * pairs], initial=np.inf))
+    return replace(tolerances, contact=min(most, PER_CLEARANCE * clearance))
 
 
-def _length(solid: Solid) -> float:
-    return float(np.max(solid.upper - solid.lower))
+def _overlap(solid: Solid) -> float:
+    """Return the largest overlap that does not block one part [m].
+
+    For a small or thin one it is the usual one over a power of the root of two, so that there are
+    few lengths to decide for.
+    """
+    length = float(np.max(solid.upper - solid.lower))
+    wanted = min(USUAL, PER_SIZE * length, PER_THICKNESS * solid.thickness)
+    return USUAL * 2.0 ** (float(np.floor(2.0 * np.log2(max(wanted, 1e-9) / USUAL))) / 2.0)
