@@ -114,6 +114,27 @@ def test_contained_parts_overlap():
     assert (error.part, error.other) == ("block", "seed")
 
 
+@pytest.mark.parametrize(("hole", "pin"), [(24, 36), (12, 64), (16, 24), (96, 12), (24, 24)])
+@pytest.mark.parametrize("radius", [5.0, 25.0])
+def test_facets_that_do_not_match_are_a_line_to_line_fit(hole, pin, radius):
+    """A hole of radius 25 mm with 12 facets lies 0.85 mm inside its circle."""
+    block = box((80, 80, 20), (-40, -40, 0)) - rod(2 * radius, 5, 25, hole)
+    peg = rod(2 * radius, 5, 35, pin).rotate([0, 0, 180 / hole])
+    matrices = matrices_of(product_of({"block": block, "peg": peg}))
+    assert not matrices.errors
+    assert ways(matrices, "peg", "block") == ["+z"]
+
+
+@pytest.mark.parametrize("interference", [0.15, 0.3])
+def test_an_overlap_deeper_than_the_facets_are_coarse_is_an_error(interference):
+    """64 facets lie 0.03 mm off a circle of radius 25 mm; chamfers and flats are no curves."""
+    for facets in (64, 96):
+        hole = rod(50, 5, 25, facets) + Manifold.cylinder(2, 25, 27, facets).translate([0, 0, 18])
+        block = box((80, 80, 20), (-40, -40, 0)) - hole
+        peg = rod(50 + 2 * interference, 5, 35, facets).rotate([0, 0, 1.3])
+        assert len(matrices_of(product_of({"block": block, "peg": peg})).errors) == 1
+
+
 def test_the_rest_of_an_assembly_is_decided_all_the_same():
     """Two of four blocks on a plate overlap; what holds for the others does not change."""
     shapes = {"plate": box((80, 40, 5), (-40, -20, -5))}
@@ -133,7 +154,7 @@ def test_a_declared_press_fit_is_planned_and_reported():
     assert fixing.feasible and fixing.evidence and fixing.matrices
     assert ways(fixing.matrices, "pin", "block") == ["+z"]
     (one,) = fixing.evidence.overlaps
-    assert one.declared == "press"
+    assert one.kind == "press"
     assert 1e3 * one.depth == pytest.approx(0.1, abs=0.003)
 
 

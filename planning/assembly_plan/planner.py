@@ -65,9 +65,9 @@ class FixingPlan:
 
     @property
     def overlaps(self) -> tuple[Overlap, ...]:
-        """Overlaps that are neither threads nor declared, deepest first."""
+        """Overlaps that nothing explains, deepest first."""
         found = self.evidence.overlaps if self.evidence else ()
-        return tuple(one for one in found if not one.declared)
+        return tuple(one for one in found if not one.kind)
 
 
 def plan(

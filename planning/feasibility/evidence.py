@@ -71,7 +71,7 @@ class Evidence:
     Attributes:
         tolerances: Largest gap that counts as contact, and largest overlap that does not block.
         threads: Screw threads recognised in the meshes.
-        overlaps: Other overlaps, declared ones and errors of the CAD, deepest first.
+        overlaps: Other overlaps, with what explains them, deepest first.
         undercuts: What declared snap fits and flexible parts bend over.
         fragile: Decisions with a small margin, those that the plan depends on first.
         remarks: What was assumed or repaired while the product was read.

@@ -30,7 +30,7 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
             "depth_m": one.depth,
             "point_m": list(one.p_AoD),
             "volume_m3": one.volume,
-            "declared": one.declared,
+            "kind": one.kind,
         }
         for one in evidence.overlaps
     ]
@@ -84,9 +84,7 @@ def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
     for one in data["overlaps"]:
         (part, other), (x, y, z) = one["parts"], one["point_m"]
         place = (x, y, z)
-        overlaps.append(
-            Overlap(part, other, one["depth_m"], place, one["volume_m3"], one["declared"])
-        )
+        overlaps.append(Overlap(part, other, one["depth_m"], place, one["volume_m3"], one["kind"]))
     undercuts = [
         Undercut(one["part"], one["other"], one["direction"], one["width_m"], one["kind"])
         for one in data["undercuts"]
@@ -121,7 +119,7 @@ def evidence_text(evidence: Evidence) -> str:
         f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
         for thread in evidence.threads
     ]
-    lines += [_declared_text(one) for one in evidence.overlaps if one.declared]
+    lines += [_explained_text(one) for one in evidence.overlaps if one.kind]
     lines += [
         f"Declared {one.kind}: {one.part} leaves along {one.direction} over an undercut of "
         f"{1e3 * one.width:.3g} mm in {one.other}."
@@ -144,12 +142,13 @@ def _small_text(small: Mapping[str, float]) -> str:
     return f"{listed}, and {more} more" if more > 0 else listed
 
 
-def _declared_text(one: Overlap) -> str:
-    what = {"press": "interference", "accept": "overlap"}[one.declared]
-    return (
-        f"Declared {one.declared}: {one.part}, {one.other}, {what} of {1e3 * one.depth:.3g} mm at "
-        f"{point_text(one.p_AoD)}."
-    )
+def _explained_text(one: Overlap) -> str:
+    """Return an overlap that is no error as a sentence."""
+    pair, depth = f"{one.part}, {one.other}", f"{1e3 * one.depth:.3g} mm"
+    if one.kind == "facets":
+        return f"Line to line: {pair} overlap by {depth}, as far as their facets are coarse."
+    what = "interference" if one.kind == "press" else "overlap"
+    return f"Declared {one.kind}: {pair}, {what} of {depth} at {point_text(one.p_AoD)}."
 
 
 def _vector_text(vector: Sequence[float]) -> str:

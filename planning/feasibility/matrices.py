@@ -63,8 +63,8 @@ class AssemblyMatrices:
 
     @property
     def errors(self) -> tuple[Overlap, ...]:
-        """Overlaps that are neither threads nor declared."""
-        return tuple(one for one in self.overlaps.others if not one.declared)
+        """Overlaps that nothing explains."""
+        return tuple(one for one in self.overlaps.others if not one.kind)
 
     def indices(self, names: Sequence[str]) -> list[int]:
         """Return the matrix indices of parts."""
@@ -125,7 +125,7 @@ def fitted_pairs(
     for bolt, nut in [*threads, *overlaps.screws]:
         yield solids[bolt], solids[nut].without(solids[bolt])
     for one in overlaps.others:
-        if one.declared:
+        if one.kind:
             tolerance = tolerances.overlap_of(one.part, one.other)
             yield fitted_pair(solids[one.part], solids[one.other], tolerance)
 

@@ -3,7 +3,8 @@
 Rigid parts cannot overlap, but CAD draws some that do. A thread often comes as a hole at the tap
 drill's diameter with a bolt at the nominal one: a product declares it, or it is recognised in the
 meshes (``cad_threads``). A press fit, or an overlap to be ignored, is declared by the user. In
-these cases the common volume is cut out of one of the two, so that they touch line to line, before
+these cases, and where two curved surfaces overlap by no more than their facets are coarse, the
+common volume is cut out of one of the two, so that they touch line to line, before
 it is decided how they come apart. Any other overlap deeper than the tolerance is an error of poses
 or shapes; all of them are reported, and a plan with one of them is not feasible.
 """
@@ -13,9 +14,12 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from cell.products.product import Product
 from planning.feasibility.cad_threads import THREAD_HEIGHT_PER_PITCH, CadThread, find_thread
 from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.facets import sagitta
 from planning.feasibility.interference import interference
 from planning.feasibility.overlap_depth import overlap_of
 from planning.feasibility.solids import Solid
@@ -32,7 +36,8 @@ class Overlap:
         depth: Where it is deepest [m]: see ``overlap_depth``.
         p_AoD: That place in A [m].
         volume: Common volume [m3].
-        declared: "press" or "accept", as the user declared it; "" if it is an error.
+        kind: "press" or "accept", as the user declared it; "facets" if it is no deeper than the
+            facets of the two are coarse; "" if it is an error.
     """
 
     part: str
@@ -40,7 +45,7 @@ class Overlap:
     depth: float
     p_AoD: tuple[float, float, float]
     volume: float
-    declared: str = ""
+    kind: str = ""
 
 
 @dataclass(frozen=True)
@@ -50,7 +55,7 @@ class Overlaps:
     Attributes:
         threads: Recognised in the meshes.
         screws: (bolt, nut) of the declared screws whose thread is drawn as an overlap.
-        others: Declared ones and errors.
+        others: Declared ones, coarse facets, and errors.
     """
 
     threads: tuple[CadThread, ...] = ()
@@ -89,8 +94,11 @@ def find_overlaps(
         screw = _declared_screw(product, a, b, found.depth, tolerance)
         if screw:
             screws.append(screw)
-        else:
-            others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, declared))
+            continue
+        kind = declared
+        if not declared and found.depth <= _coarseness(solids[a], solids[b], found.depth):
+            kind = "facets"
+        others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, kind))
     return Overlaps(tuple(threads), tuple(screws), tuple(others))
 
 
@@ -104,6 +112,13 @@ def _declared_screw(
             deepest = THREAD_HEIGHT_PER_PITCH * screw.pitch + tolerance
             return (bolt, nut) if depth <= deepest else None
     return None
+
+
+def _coarseness(a: Solid, b: Solid, depth: float) -> float:
+    """Return how far the facets of two parts may overlap where they fit line to line [m]."""
+    low = np.maximum(a.lower, b.lower) - depth
+    high = np.minimum(a.upper, b.upper) + depth
+    return sagitta(a, low, high) + sagitta(b, low, high)
 
 
 def fitted_pair(part: Solid, other: Solid, tolerance: float) -> tuple[Solid, Solid]:
