@@ -172,6 +172,17 @@ def test_an_accepted_overlap_counts_as_contact(accept):
     assert "-z" not in ways(fixing.matrices, "key", "plate")
 
 
+def test_accepting_all_overlaps_leaves_threads_threads():
+    base = box((30, 30, 20), (-15, -15, -20)) - rod(2.5, -10, 5, 32)
+    key = box((5, 5, 5), (8, 8, -0.5))
+    product = product_of({"base": base, "bolt": rod(3, -5, 6, 32), "key": key})
+    matrices = matrices_of(replace(product, declared=declared_from(product, accept=["all"])))
+    assert [(thread.bolt, thread.nut) for thread in matrices.threads] == [("bolt", "base")]
+    assert [(one.part, one.other, one.kind) for one in matrices.overlaps.others] == [
+        ("base", "key", "accept")
+    ]
+
+
 def test_what_is_declared_without_need_is_said():
     product = two_blocks(0.0)
     declared = declared_from(product, press=["low,high"], snap=["high,low"], flexible=["low"])

@@ -30,7 +30,7 @@ class Declared:
         press: Pairs with interference, one pressed into the other.
         snap: Pairs of which one springs over an undercut of the other.
         flexible: Parts that stretch or bend over what they fit round, such as belts.
-        accept_all: Whether every overlap is accepted.
+        accept_all: Whether every overlap is accepted that nothing else explains.
     """
 
     accept: frozenset[Pair] = field(default_factory=frozenset)
@@ -40,11 +40,11 @@ class Declared:
     accept_all: bool = False
 
     def overlap_kind(self, part: str, other: str) -> str:
-        """Return what an overlap of two parts is declared to be: "press", "accept", or ""."""
+        """Return what the overlap of a pair is declared to be: "press", "accept", or ""."""
         pair = frozenset((part, other))
         if pair in self.press:
             return "press"
-        return "accept" if self.accept_all or pair in self.accept else ""
+        return "accept" if pair in self.accept else ""
 
 
 def declared_from(

@@ -95,7 +95,7 @@ def find_overlaps(
         if screw:
             screws.append(screw)
             continue
-        kind = declared
+        kind = declared or ("accept" if product.declared.accept_all else "")
         if not declared and found.depth <= _coarseness(solids[a], solids[b], found.depth):
             kind = "facets"
         others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, kind))
