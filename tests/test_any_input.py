@@ -16,6 +16,7 @@ import cell.products.loading as loading
 from cell.errors import BadPart, InputError, UnknownName
 from cell.products.identical import handedness, identical_parts
 from cell.products.loading import DEFAULT_DENSITY, load_product
+from cell.products.read_options import ReadOptions
 from experiments.cli.main import main
 
 PLATE = box((40, 40, 10), (-20, -20, 0)) - rod(6, -1, 11, 32) - rod(6, -1, 11).translate([12, 0, 0])
@@ -76,7 +77,7 @@ def test_gltf_keeps_names_and_poses(tmp_path: Path) -> None:
     assert product.parts["right_pin"].mesh.centroid[0] == pytest.approx(0.01)
     assert product.parts["left_pin"].mesh.volume == pytest.approx(pin.volume)
     with pytest.raises(InputError, match="states its own units"):
-        load_product(tmp_path / "pins.glb", "mm")
+        load_product(tmp_path / "pins.glb", ReadOptions("mm"))
 
 
 @pytest.mark.parametrize("suffix", ["step", "glb"])
@@ -93,7 +94,7 @@ def test_a_broken_assembly_file_is_one_line(tmp_path: Path, text: str, suffix, c
 def test_densities_are_of_parts_or_of_all(tmp_path: Path) -> None:
     file = step_file(tmp_path)
     plain = load_product(file)
-    product = load_product(file, densities={"": 1000.0, "base": 7850.0})
+    product = load_product(file, ReadOptions(densities={"": 1000.0, "base": 7850.0}))
     volume = {name: float(part.mesh.volume) for name, part in product.parts.items()}
     assert product.parts["base"].mass == pytest.approx(7850.0 * volume["base"])
     assert product.parts["pin"].mass == pytest.approx(1000.0 * volume["pin"])
@@ -101,9 +102,9 @@ def test_densities_are_of_parts_or_of_all(tmp_path: Path) -> None:
     assert any("density of all parts" in remark for remark in plain.remarks)
     assert not any("density" in remark for remark in product.remarks)
     with pytest.raises(UnknownName, match="No part 'bas'.*'base'"):
-        load_product(file, densities={"bas": 1.0})
+        load_product(file, ReadOptions(densities={"bas": 1.0}))
     with pytest.raises(InputError, match="above zero"):
-        load_product(file, densities={"": 0.0})
+        load_product(file, ReadOptions(densities={"": 0.0}))
 
 
 def cube() -> trimesh.Trimesh:
@@ -120,7 +121,7 @@ def test_duplicated_corners_are_welded_and_said(tmp_path: Path) -> None:
     corners = cube().triangles.reshape(-1, 3)
     corners = corners + np.random.default_rng(0).uniform(-2e-5, 2e-5, corners.shape)
     soup = trimesh.Trimesh(corners, np.arange(36).reshape(-1, 3), process=False)
-    product = load_product(exported(soup, tmp_path), "mm")
+    product = load_product(exported(soup, tmp_path), ReadOptions("mm"))
     mesh = product.parts["cube"].mesh
     assert mesh.is_volume and len(mesh.vertices) == 8
     assert mesh.volume == pytest.approx(8e-6, rel=1e-6)
@@ -132,12 +133,12 @@ def test_doubled_and_turned_faces_are_repaired_and_said(tmp_path: Path) -> None:
     doubled = trimesh.Trimesh(
         whole.vertices, np.vstack([whole.faces, whole.faces[:3]]), process=False
     )
-    product = load_product(exported(doubled, tmp_path), "mm")
+    product = load_product(exported(doubled, tmp_path), ReadOptions("mm"))
     assert any("3 degenerate or doubled faces removed" in r for r in product.remarks)
     faces = np.array(whole.faces)
     faces[4] = faces[4][::-1]
     product = load_product(
-        exported(trimesh.Trimesh(whole.vertices, faces, process=False), tmp_path), "mm"
+        exported(trimesh.Trimesh(whole.vertices, faces, process=False), tmp_path), ReadOptions("mm")
     )
     assert product.parts["cube"].mesh.volume == pytest.approx(8e-6)
     assert any("turned outwards" in r for r in product.remarks)
@@ -146,7 +147,7 @@ def test_doubled_and_turned_faces_are_repaired_and_said(tmp_path: Path) -> None:
 def test_a_hole_is_not_guessed_shut(tmp_path: Path) -> None:
     open_cube = trimesh.Trimesh(cube().vertices, cube().faces[1:], process=False)
     with pytest.raises(BadPart, match=r"'cube'.*not watertight: 3 open edges, one of them at \("):
-        load_product(exported(open_cube, tmp_path), "mm")
+        load_product(exported(open_cube, tmp_path), ReadOptions("mm"))
 
 
 def test_identical_parts_are_found_in_any_pose() -> None:
@@ -170,8 +171,8 @@ def test_grouping_is_opt_in_and_keeps_declared_groups(tmp_path: Path) -> None:
     file = step_file(tmp_path)
     assert load_product(file).groups == {}
     assert any("identical parts: pin, pin_2" in r for r in load_product(file).remarks)
-    assert load_product(file, group=True).groups == {"pins": ("pin", "pin_2")}
-    bolts = load_product("motor_unit", group=True)
+    assert load_product(file, ReadOptions(group=True)).groups == {"pins": ("pin", "pin_2")}
+    bolts = load_product("motor_unit", ReadOptions(group=True))
     assert list(bolts.groups) == ["bolts"] and bolts.remarks == ()
 
 
@@ -250,4 +251,4 @@ def test_too_many_parts_are_refused_with_the_reason(tmp_path, monkeypatch) -> No
     monkeypatch.setattr(loading, "MOST_PARTS", 1)
     folder_of(tmp_path, {"low": LOW, "high": HIGH})
     with pytest.raises(InputError, match="has 2 parts, and plans are for up to 1: plan its sub"):
-        load_product(tmp_path, "mm")
+        load_product(tmp_path, ReadOptions("mm"))

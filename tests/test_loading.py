@@ -11,6 +11,7 @@ from cell.errors import BadOrder, BadPart, InputError, UnknownName
 from cell.products.assembly_io import DEFLECTION, FACET_ANGLE, load_assembly
 from cell.products.loading import load_product, product_names
 from cell.products.mesh_io import MESH_SUFFIXES
+from cell.products.read_options import ReadOptions
 
 GOOD = """
 name: pair
@@ -96,7 +97,7 @@ def test_yaml_reads_units_poses_and_masses(folder: Path) -> None:
 
 @pytest.mark.parametrize(("units", "size"), [("mm", 0.02), ("cm", 0.2)])
 def test_folder_is_a_product_in_assembled_pose(folder: Path, units: str, size: float) -> None:
-    product = load_product(folder, units=units)
+    product = load_product(folder, ReadOptions(units=units))
     assert list(product.parts) == ["block", "peg"]
     np.testing.assert_allclose(product.parts["block"].mesh.extents, [size] * 3)
     assert product.parts["peg"].mesh.centroid[2] == pytest.approx(25 / 20 * size)
@@ -109,7 +110,7 @@ def test_every_supported_type_is_read(tmp_path: Path, suffix: str) -> None:
     scale = 1e-3 if suffix == ".glb" else 1.0
     cube = trimesh.creation.box((20 * scale,) * 3)
     cube.export(tmp_path / f"cube{suffix}")
-    part = load_product(tmp_path, None if suffix == ".glb" else "mm").parts["cube"]
+    part = load_product(tmp_path, ReadOptions(None if suffix == ".glb" else "mm")).parts["cube"]
     assert part.mesh.is_volume
     np.testing.assert_allclose(part.mesh.extents, [0.02] * 3, rtol=1e-6)
 
@@ -118,7 +119,7 @@ def test_inward_surface_is_turned_outwards(tmp_path: Path) -> None:
     cube = trimesh.creation.box((20, 20, 20))
     cube.invert()
     cube.export(tmp_path / "cube.ply")
-    assert load_product(tmp_path, "mm").parts["cube"].mesh.volume == pytest.approx(8e-6)
+    assert load_product(tmp_path, ReadOptions("mm")).parts["cube"].mesh.volume == pytest.approx(8e-6)
 
 
 def test_unknown_product_names_the_nearest() -> None:
@@ -138,9 +139,9 @@ def test_unsupported_input_lists_what_is(folder: Path) -> None:
 
 def test_unknown_unit_lists_the_known(folder: Path) -> None:
     with pytest.raises(UnknownName, match="No unit 'mn'.*cm, in, m, mm"):
-        load_product(folder, units="mn")
+        load_product(folder, ReadOptions("mn"))
     with pytest.raises(InputError, match="states its own units"):
-        load_product(write(folder, GOOD), units="cm")
+        load_product(write(folder, GOOD), ReadOptions("cm"))
 
 
 @pytest.mark.parametrize(
@@ -148,17 +149,17 @@ def test_unknown_unit_lists_the_known(folder: Path) -> None:
 )
 def test_implausible_size_is_refused(folder: Path, units: str, message: str | None) -> None:
     if message is None:
-        assert load_product(folder, units=units).parts["block"].mesh.extents[0] < 1.0
+        assert load_product(folder, ReadOptions(units=units)).parts["block"].mesh.extents[0] < 1.0
         return
     with pytest.raises(BadPart, match=message):
-        load_product(folder, units=units)
+        load_product(folder, ReadOptions(units=units))
 
 
 def test_tiny_part_is_refused(tmp_path: Path) -> None:
     trimesh.creation.box((0.02,) * 3).export(tmp_path / "cube.stl")
     with pytest.raises(BadPart, match="cube.*micrometres.*wrong units"):
-        load_product(tmp_path, "mm")
-    assert load_product(tmp_path, units="m")
+        load_product(tmp_path, ReadOptions("mm"))
+    assert load_product(tmp_path, ReadOptions("m"))
 
 
 def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
@@ -170,16 +171,16 @@ def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
     for mesh, reason in [(hole, "not watertight"), (flat, "no volume|not watertight")]:
         mesh.export(tmp_path / "part.obj")
         with pytest.raises(BadPart, match=f"'part'.*({reason})"):
-            load_product(tmp_path, "mm")
+            load_product(tmp_path, ReadOptions("mm"))
     (tmp_path / "part.obj").write_text("v 0 0\nf nonsense\n")
     with pytest.raises(BadPart, match="'part'"):
-        load_product(tmp_path, "mm")
+        load_product(tmp_path, ReadOptions("mm"))
 
 
 def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -> None:
     trimesh.creation.box((5, 5, 5)).export(folder / "peg.obj")
     with pytest.raises(BadPart, match="'peg'.*two files"):
-        load_product(folder, "mm")
+        load_product(folder, ReadOptions("mm"))
     empty = tmp_path / "empty"
     empty.mkdir()
     with pytest.raises(InputError, match="no mesh; supported: .obj"):

@@ -105,7 +105,7 @@ def evidence_of(
         product.contact_tolerance == matrices.tolerance,
         matrices.threads,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
-        (*product.remarks, *_doubts(product.items(), matrices)),
+        (*product.notes, *_doubts(product.items(), matrices)),
         tuple(_item_freedoms(matrices, steps)) if slanted else (),
     )
 
