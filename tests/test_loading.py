@@ -8,7 +8,7 @@ import trimesh
 from step_files import StepFile
 
 from cell.errors import BadOrder, BadPart, InputError, UnknownName
-from cell.products.assembly_io import DEFLECTION, FACET_ANGLE, load_assembly
+from cell.products.assembly_io import DEFLECTION, FACET_ANGLE
 from cell.products.loading import load_product, product_names
 from cell.products.mesh_io import MESH_SUFFIXES
 from cell.products.read_options import ReadOptions
@@ -145,21 +145,29 @@ def test_unknown_unit_lists_the_known(folder: Path) -> None:
 
 
 @pytest.mark.parametrize(
-    ("units", "message"), [("m", "block.*larger than the cell: wrong units"), ("in", None)]
+    ("units", "scale", "remark"),
+    [
+        ("m", 1.0, "block, peg up to 30 m long: planned, but nothing here can hold more than 1 m"),
+        ("in", 1.0, None),
+        ("mm", 1e-3, "block down to 20 micrometres long: wrong units?"),
+    ],
 )
-def test_implausible_size_is_refused(folder: Path, units: str, message: str | None) -> None:
-    if message is None:
-        assert load_product(folder, ReadOptions(units=units)).parts["block"].mesh.extents[0] < 1.0
-        return
-    with pytest.raises(BadPart, match=message):
-        load_product(folder, ReadOptions(units=units))
+def test_size_has_no_limits_in_planning_but_is_remarked(
+    tmp_path: Path, units: str, scale: float, remark: str | None
+) -> None:
+    for name, size in (("block", (20, 20, 20)), ("peg", (5, 5, 30 if scale == 1.0 else 900))):
+        trimesh.creation.box(scale * np.array(size)).export(tmp_path / f"{name}.stl")
+    product = load_product(tmp_path, ReadOptions(units=units))
+    said = [note for note in product.notes if " long: " in note]
+    assert (remark is None and not said) or (remark is not None and remark in said[0])
+    assert len(said) <= 1
 
 
-def test_tiny_part_is_refused(tmp_path: Path) -> None:
-    trimesh.creation.box((0.02,) * 3).export(tmp_path / "cube.stl")
-    with pytest.raises(BadPart, match="cube.*micrometres.*wrong units"):
-        load_product(tmp_path, ReadOptions("mm"))
-    assert load_product(tmp_path, ReadOptions("m"))
+def test_what_nothing_can_hold_is_not_assembled(folder: Path) -> None:
+    """The limit on size belongs to execution."""
+    trimesh.creation.box((2000, 20, 20)).export(folder / "block.stl")
+    with pytest.raises(BadPart, match=r"'block'.*2 m long: nothing here can hold it \(1 m at most"):
+        load_product(write(folder, GOOD)).check_simulable()
 
 
 def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
@@ -201,7 +209,7 @@ def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -
         ("mesh: block.stl", "model: motor", "'block'.*remove 'mass_kg'"),
         ("peg: {mesh", "block: {mesh", "'block' occurs twice"),
         ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 20]", "assembled_pose.xyz_mm.*three numbers"),
-        ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 0, 20000]", "outside of the cell"),
+        ("peg: {mesh", "peg: {tray_pose: {xyz_mm: [0, 0, 20000]}, mesh", "outside of the cell"),
         ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 0, .nan]", "expected a number"),
         ("name: pair", "name: pair\nup: up", "No axis 'up'"),
         ("name: pair", "name: pair\nunits: furlong", "No unit 'furlong'"),
@@ -250,7 +258,7 @@ def test_step_is_tessellated_as_finely_as_the_tolerance_asks_for(radius, tmp_pat
     file = StepFile()
     file.product("rod", "ADVANCED_BREP_SHAPE_REPRESENTATION", [file.world(), file.rod(radius, 3.0)])
     (tmp_path / "rod.step").write_text(file.text())
-    (mesh,) = load_assembly(tmp_path / "rod.step").values()
+    mesh = load_product(tmp_path / "rod.step").parts["rod"].mesh
     facets = int((np.abs(mesh.vertices[:, 2]) < 1e-9).sum())
     step = min(FACET_ANGLE, 2.0 * np.arccos(1.0 - DEFLECTION / radius))
     assert 2.0 * np.pi / step <= facets <= 2.2 * 2.0 * np.pi / step

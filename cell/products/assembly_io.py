@@ -63,6 +63,15 @@ def load_assembly(
     return _StepTree(file, text, tolerance, above).named(tree)
 
 
+def referred_files(file: Path) -> list[Path]:
+    """Return the files, beside a STEP file, in which it says that shapes of its products are."""
+    if file.suffix.lower() not in STEP_SUFFIXES:
+        return []
+    documents = StepText(file.read_bytes()).documents()
+    found = {_beside(file, name) for names in documents.values() for name in names}
+    return sorted(f for f in found if f is not None and f != file)
+
+
 class _StepTree:
     """Names for the tree that OpenCASCADE made of a STEP file, and what it left out of it."""
 

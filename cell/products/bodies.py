@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import combinations
 
 import manifold3d
 import numpy as np
@@ -62,7 +61,7 @@ class Bodies:
         if len(self.solids) == 1:
             return self.solids[0], False
         whole = self.whole or _joined(self.solids)
-        if not any(_boxes_overlap(*pair) for pair in combinations(self.solids, 2)):
+        if not _any_boxes_overlap(self.solids):
             return whole, False
         union = manifold3d.Manifold.batch_boolean(
             [_manifold(solid) for solid in self.solids], manifold3d.OpType.Add
@@ -142,9 +141,13 @@ def _surrounds(outer: trimesh.Trimesh, inner: trimesh.Trimesh) -> bool:
     return abs(float(half.sum())) > np.pi
 
 
-def _boxes_overlap(a: trimesh.Trimesh, b: trimesh.Trimesh) -> bool:
-    shared = np.minimum(a.bounds[1], b.bounds[1]) - np.maximum(a.bounds[0], b.bounds[0])
-    return bool(np.all(shared > OVERLAP * max(a.scale, b.scale)))
+def _any_boxes_overlap(meshes: Sequence[trimesh.Trimesh]) -> bool:
+    low, high = (np.array([mesh.bounds[k] for mesh in meshes]) for k in (0, 1))
+    least = OVERLAP * float((high - low).max())
+    return any(
+        bool(np.all(np.minimum(high[k], high[:k]) - np.maximum(low[k], low[:k]) > least, 1).any())
+        for k in range(1, len(meshes))
+    )
 
 
 def _manifold(mesh: trimesh.Trimesh) -> manifold3d.Manifold:

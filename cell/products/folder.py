@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from cell.errors import BadPart, InputError
-from cell.products.assembly_io import ASSEMBLY_SUFFIXES, load_assembly
+from cell.products.assembly_io import ASSEMBLY_SUFFIXES, load_assembly, referred_files
 from cell.products.mesh_io import MESH_SUFFIXES, METERS_PER_UNIT, load_surfaces, meters_per_unit
 from cell.products.parts import NOT_WANTED
 from cell.products.product import LeftOut
@@ -43,6 +43,13 @@ def read_folder(folder: Path, options: ReadOptions) -> Contents:
         InputError: Or `BadPart`: no CAD file, two of one name, one that cannot be read, no unit.
     """
     files, left_out = _sorted_files(folder, options.leave_out)
+    referred = {f: file for file in files for f in referred_files(file)}
+    left_out += [
+        LeftOut(file.name, f"read as part of {referred[file].name}, which refers to it")
+        for file in files
+        if file in referred
+    ]
+    files = [file for file in files if file not in referred] or files  # If they refer in a circle.
     if not files:
         kinds = ", ".join(CAD_SUFFIXES)
         raise InputError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
@@ -62,7 +69,7 @@ def read_folder(folder: Path, options: ReadOptions) -> Contents:
             remarks += _keeps_its_unit(file, options.units, without[0]) if without else []
         else:
             nodes.append(_mesh_node(file, options.units))
-    return Contents(Node(children=tuple(nodes)), tuple(left_out), tuple(remarks))
+    return Contents(trimmed(Node(children=tuple(nodes))), tuple(left_out), tuple(remarks))
 
 
 def read_file(file: Path, options: ReadOptions) -> Contents:

@@ -103,7 +103,8 @@ def _from_product_file(name_or_path: str | Path, options: ReadOptions) -> Produc
         raise InputError(f"'{file.name}' lists its parts and groups itself; {what}.")
     product = read_product(file)
     repairs = {name: part.mesh.metadata.get(REPAIR, "") for name, part in product.parts.items()}
-    return replace(product, remarks=(*product.remarks, *_repaired(repairs)))
+    sizes = _sizes({name: part.mesh for name, part in product.parts.items()})
+    return replace(product, remarks=(*product.remarks, *sizes, *_repaired(repairs)))
 
 
 def _unsupported(path: Path) -> InputError:

@@ -69,22 +69,27 @@ def load_mesh(path: Path, name: str, units: str | None = None) -> trimesh.Trimes
 def load_surfaces(path: Path, name: str) -> list[tuple[str, trimesh.Trimesh]]:
     """Read a file's surfaces, in its unit, each with the name of its object; "" if it has one only.
 
+    What is no surface, such as points, is a surface without faces.
+
     Raises:
         BadPart: It cannot be read.
     """
-    which = _objects(path) if path.suffix.lower() == ".obj" else {}
-    if not which:
-        return [("", _read(path, name))]
+    by = _objects(path) if path.suffix.lower() == ".obj" else {}
     try:
-        scene = trimesh.load_scene(path, process=False, skip_materials=True, **which)
+        scene = trimesh.load_scene(path, process=False, **by)
     except Exception as error:  # The readers of the formats share no exception type.
         raise BadPart(name, f"'{path.name}' cannot be read ({error})") from error
-    shapes = [(str(n), g) for n, g in scene.geometry.items() if isinstance(g, trimesh.Trimesh)]
-    return [(label, merged(shape)) for label, shape in reversed(shapes)]  # As in the file.
+    shapes = {str(n): g for n, g in scene.geometry.items() if isinstance(g, trimesh.Trimesh)}
+    if not shapes:
+        return [("", trimesh.Trimesh())]
+    if len(shapes) == 1:
+        return [("", merged(shape)) for shape in shapes.values()]
+    listed = reversed(shapes.items()) if by else shapes.items()  # The reader goes backwards.
+    return [(label, merged(shape)) for label, shape in listed]
 
 
 def _objects(path: Path) -> dict[str, bool]:
-    """Return by what to split a Wavefront file that holds several objects, else several groups."""
+    """Return how to read a Wavefront file: by its objects if it has several, else by its groups."""
     found: dict[bytes, set[bytes]] = {b"o": set(), b"g": set()}
     current = {b"o": b"", b"g": b""}
     for line in path.read_bytes().splitlines():
@@ -94,9 +99,10 @@ def _objects(path: Path) -> dict[str, bool]:
         elif kind == b"f":
             for what, name in current.items():
                 found[what].add(name)
+    plain = {"group_material": False, "skip_materials": True}
     if len(found[b"o"]) > 1:
-        return {"split_objects": True, "group_material": False}
-    return {"split_groups": True, "group_material": False} if len(found[b"g"]) > 1 else {}
+        return plain | {"split_objects": True}
+    return plain | {"split_groups": True} if len(found[b"g"]) > 1 else plain
 
 
 def _read(path: Path, name: str) -> trimesh.Trimesh:
