@@ -78,7 +78,9 @@ def test_gltf_keeps_names_and_poses(tmp_path: Path) -> None:
     assert product.parts["left_pin"].mesh.volume == pytest.approx(pin.volume)
     small = load_product(tmp_path / "pins.glb", ReadOptions("mm"))
     np.testing.assert_allclose(small.parts["left_pin"].mesh.extents, [4e-6, 4e-6, 1e-5], rtol=1e-5)
-    assert "warning: 'pins.glb' states m, and is taken as mm, because --units says so" in small.notes
+    assert (
+        "warning: 'pins.glb' states m, and is taken as mm, because --units says so" in small.notes
+    )
 
 
 @pytest.mark.parametrize("suffix", ["step", "glb"])

@@ -12,7 +12,7 @@ from tiny_products import box, rod, to_trimesh
 
 from cell.products.bodies import Bodies, bodies_of
 from cell.products.half_edges import HalfEdges
-from cell.products.surfaces import merged
+from cell.products.surfaces import joined, merged
 
 CUBE = box((10, 10, 10), (0, 0, 0))
 HOLLOW = CUBE - box((6, 6, 6), (2, 2, 2))
@@ -22,7 +22,7 @@ SHEET = trimesh.Trimesh(1e-3 * np.array([[0, 0, 10], [10, 0, 10], [5, 0, 20]]), 
 def surface(*shapes: Manifold | trimesh.Trimesh) -> trimesh.Trimesh:
     """Return shapes as one file has them: coincident corners merged."""
     meshes = [s if isinstance(s, trimesh.Trimesh) else to_trimesh(s) for s in shapes]
-    return merged(trimesh.util.concatenate(meshes))
+    return merged(joined(meshes))
 
 
 def with_faces(mesh: trimesh.Trimesh, faces: np.ndarray) -> trimesh.Trimesh:

@@ -8,8 +8,8 @@ from types import ModuleType
 import pytest
 
 from cell.errors import BadOrder, CellError
-from experiments.cli.main import main, one_line, parse
 from cell.products.read_options import ReadOptions
+from experiments.cli.main import main, one_line, parse
 from experiments.plan.options import PlanOptions
 
 

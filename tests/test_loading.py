@@ -119,7 +119,9 @@ def test_inward_surface_is_turned_outwards(tmp_path: Path) -> None:
     cube = trimesh.creation.box((20, 20, 20))
     cube.invert()
     cube.export(tmp_path / "cube.ply")
-    assert load_product(tmp_path, ReadOptions("mm")).parts["cube"].mesh.volume == pytest.approx(8e-6)
+    assert load_product(tmp_path, ReadOptions("mm")).parts["cube"].mesh.volume == pytest.approx(
+        8e-6
+    )
 
 
 def test_unknown_product_names_the_nearest() -> None:

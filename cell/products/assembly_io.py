@@ -33,9 +33,7 @@ a sagitta of r/527, below the r/500 that counts as line to line even between par
 From 1.3 mm on, ``DEFLECTION`` asks for more: 109 facets on a hole of 12 mm."""
 
 
-def load_assembly(
-    file: Path, tolerance: float | None = None, above: tuple[Path, ...] = ()
-) -> Node:
+def load_assembly(file: Path, tolerance: float | None = None, above: tuple[Path, ...] = ()) -> Node:
     """Read a file as a tree, in its assembled pose [m]; what it refers to is read from beside it.
 
     Args:

@@ -10,9 +10,10 @@ import numpy as np
 import trimesh
 
 from cell.products.shells import taken_apart, volume
+from cell.products.surfaces import joined
 
 THIN = 1e-9
-"""[A] volume over the cube of the size: below it is rounding, or a sheet written from both sides."""
+"""[A] volume over the cube of the size: below are rounding, and sheets written from both sides."""
 
 OVERLAP = 1e-6
 """[A] shared part of the volume from which bodies overlap: above the rounding of a union."""
@@ -60,7 +61,7 @@ class Bodies:
         """Return all bodies as one surface, and whether they overlap and were united."""
         if len(self.solids) == 1:
             return self.solids[0], False
-        whole = self.whole or _joined(self.solids)
+        whole = self.whole or joined(self.solids)
         if not _any_boxes_overlap(self.solids):
             return whole, False
         union = manifold3d.Manifold.batch_boolean(
@@ -107,7 +108,9 @@ def _with_cavities(shells: Sequence[trimesh.Trimesh]) -> tuple[list[trimesh.Trim
     A shell that faces inwards inside of another is its cavity.
     """
     volumes = [enclosed(shell) for shell in shells]
-    if turned := sum(volumes) < 0.0:  # A file whose faces all face inwards is common and unambiguous.
+    if (
+        turned := sum(volumes) < 0.0
+    ):  # A file whose faces all face inwards is common and unambiguous.
         for shell in shells:
             shell.invert()
         volumes = [-volume for volume in volumes]
@@ -120,7 +123,7 @@ def _with_cavities(shells: Sequence[trimesh.Trimesh]) -> tuple[list[trimesh.Trim
             shells[k].invert()
             cavities[k], turned = [], True
     bodies = [
-        _joined([shells[k], *(shells[c] for c in cavities[k])]) if cavities[k] else shells[k]
+        joined([shells[k], *(shells[c] for c in cavities[k])]) if cavities[k] else shells[k]
         for k in sorted(cavities)
     ]
     return bodies, turned
@@ -155,16 +158,8 @@ def _manifold(mesh: trimesh.Trimesh) -> manifold3d.Manifold:
     return manifold3d.Manifold(manifold3d.Mesh64(np.asarray(mesh.vertices, float), faces))
 
 
-def _joined(meshes: Sequence[trimesh.Trimesh]) -> trimesh.Trimesh:
-    """Return several surfaces as one, without merging their corners."""
-    starts = np.cumsum([0, *(len(mesh.vertices) for mesh in meshes[:-1])])
-    faces = [np.asarray(m.faces) + n for m, n in zip(meshes, starts, strict=True)]
-    vertices = np.concatenate([mesh.vertices for mesh in meshes])
-    return trimesh.Trimesh(vertices, np.concatenate(faces), process=False)
-
-
 def _rejected(piece: trimesh.Trimesh) -> Rejected:
-    """Return what is wrong with an open piece: how many edges are open, and where one of them is."""
+    """Return what is wrong with an open piece: how many edges are open, where one of them is."""
     edges, count = np.unique(piece.edges_sorted, axis=0, return_counts=True)
     edges = edges[count == 1]
     if not len(edges):

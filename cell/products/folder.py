@@ -1,4 +1,4 @@
-"""A folder of CAD files in assembled pose as a tree: each mesh a part, each assembly a sub-assembly."""
+"""CAD files, by themselves or in a folder in assembled pose, as one tree of parts."""
 
 from __future__ import annotations
 

@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from cell.errors import InputError
-from cell.products.surfaces import merged
+from cell.products.surfaces import joined, merged
 from cell.products.tree import Node, Surface
 
 TRIANGLES, TRIANGLE_STRIP = 4, 5
@@ -88,7 +88,7 @@ def _surfaces(header: Mapping[str, Any], binary: bytes) -> list[trimesh.Trimesh 
     wanted = sorted({key for group in keys for key in group}, key=str)
     scene = _loaded(header, binary, wanted)
     shapes: dict[tuple[Any, ...], trimesh.Trimesh] = {
-        group: merged(trimesh.util.concatenate([scene[wanted.index(key)] for key in group]))
+        group: merged(joined([scene[wanted.index(key)] for key in group]))
         for group in set(keys)
         if group
     }
@@ -123,9 +123,7 @@ def _loaded(
     text += b" " * (-len(text) % 4)
     size = 20 + len(text) + len(binary)
     glb = struct.pack("<4sII I4s", b"glTF", 2, size, len(text), b"JSON") + text + binary
-    scene = trimesh.load_scene(
-        io.BytesIO(glb), file_type="glb", process=False, skip_materials=True
-    )
+    scene = trimesh.load_scene(io.BytesIO(glb), file_type="glb", process=False, skip_materials=True)
     loaded = []
     for k, (position, _, _) in enumerate(wanted):
         mesh = scene.geometry[str(k)]

@@ -1,5 +1,4 @@
-"""Half-edges of a triangle surface: which faces meet at an edge, in which sense, and which belong
-together there."""
+"""Half-edges of a triangle surface: which faces meet at an edge, and belong together there."""
 
 from __future__ import annotations
 
@@ -61,7 +60,7 @@ class HalfEdges:
 
     def labels(self, pairs: np.ndarray) -> np.ndarray:
         """Return (m,) labels of the pieces in which the faces hang together by pairs (p, 2)."""
-        return joined(len(self.faces), pairs // 3)
+        return components(len(self.faces), pairs // 3)
 
     def wedges(self, vertices: np.ndarray) -> np.ndarray:
         """Return (p, 2) half-edges whose faces bound the same wedge of material at their edge.
@@ -105,7 +104,7 @@ class HalfEdges:
         return np.array(wedges)
 
 
-def joined(count: int, pairs: np.ndarray) -> np.ndarray:
+def components(count: int, pairs: np.ndarray) -> np.ndarray:
     """Return (count,) labels of the connected components of a graph with edges (p, 2)."""
     ones = np.ones(len(pairs), bool)
     graph = coo_array((ones, (pairs[:, 0], pairs[:, 1])), shape=(count, count))

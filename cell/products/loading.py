@@ -39,17 +39,18 @@ def product_names() -> list[str]:
     return sorted(file.stem for file in PRODUCTS.glob("*.yaml"))
 
 
-def load_product(name_or_path: str | Path, options: ReadOptions = ReadOptions()) -> Product:
+def load_product(name_or_path: str | Path, options: ReadOptions | None = None) -> Product:
     """Return a product.
 
     Args:
         name_or_path: A name in ``models/products``, a product file (YAML), a STEP or glTF (.glb)
             assembly, or a folder of meshes and assemblies in assembled pose.
-        options: How CAD is read, and what of it is wanted.
+        options: How CAD is read, and what of it is wanted; None for what files say.
 
     Raises:
         InputError: Or one of its children, naming what cannot be used and the alternatives.
     """
+    options = options or ReadOptions()
     if options.units is not None:
         meters_per_unit(options.units)  # A wrong name is an error even where no unit is needed.
     if options.depth is not None and options.depth < 1:
@@ -207,7 +208,9 @@ def _tree(parts: Iterable[str], groups: Mapping[str, tuple[str, ...]]) -> list[s
     if groups:
         listed = _listed([f"{name} ({len(members)} parts)" for name, members in groups.items()])
         return [f"sub-assemblies that are one item each: {listed}"]
-    listed = _listed([f"{n} ({len(members)} parts)" for n, members in found.items() if "/" not in n])
+    listed = _listed(
+        [f"{n} ({len(members)} parts)" for n, members in found.items() if "/" not in n]
+    )
     return [f"sub-assemblies: {listed}; --depth 1 makes one item of each"]
 
 
@@ -216,11 +219,12 @@ def _several(parts: Parts) -> list[str]:
     by_number: dict[tuple[int, bool], list[str]] = {}
     for name, number in parts.several.items():
         by_number.setdefault((number, name in parts.united), []).append(name)
-    return [
-        f"{_listed(names)} {'holds' if len(names) == 1 else 'each hold'} {number} "
-        f"{'bodies that overlap, united' if united else 'separate bodies'}; --split makes them parts"
-        for (number, united), names in by_number.items()
-    ]
+    remarks = []
+    for (number, united), names in by_number.items():
+        hold = "holds" if len(names) == 1 else "each hold"
+        what = "bodies that overlap, united" if united else "separate bodies"
+        remarks.append(f"{_listed(names)} {hold} {number} {what}; --split makes them parts")
+    return remarks
 
 
 def _sizes(meshes: Mapping[str, trimesh.Trimesh]) -> list[str]:

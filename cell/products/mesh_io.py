@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -27,7 +28,7 @@ LARGEST_PART = 1.0
 """[m] [D] the reach of the arms is 0.85 m: nothing here can hold a longer part."""
 
 SMALLEST_PART = 2e-4
-"""[m] [D] a tenth of the smallest bolt's diameter: a smaller part was read in wrong units, probably."""
+"""[m] [D] a tenth of the smallest bolt's diameter: units of a smaller part are wrong, probably."""
 
 CREASE = 0.5
 """[rad] [R] edges sharper than this keep separate normals, so that they are rendered sharp."""
@@ -88,7 +89,7 @@ def load_surfaces(path: Path, name: str) -> list[tuple[str, trimesh.Trimesh]]:
     return [(label, merged(shape)) for label, shape in listed]
 
 
-def _objects(path: Path) -> dict[str, bool]:
+def _objects(path: Path) -> dict[str, Any]:
     """Return how to read a Wavefront file: by its objects if it has several, else by its groups."""
     found: dict[bytes, set[bytes]] = {b"o": set(), b"g": set()}
     current = {b"o": b"", b"g": b""}

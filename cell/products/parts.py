@@ -1,4 +1,4 @@
-"""From the tree of CAD files to parts: bodies told apart, split or joined, unsound ones left out."""
+"""From the tree of CAD files to parts: bodies told apart, split or joined, or left out."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import numpy as np
 import trimesh
 
 from cell.products.bodies import Bodies, bodies_of
-from cell.products.surfaces import merged
 from cell.products.product import LeftOut
+from cell.products.surfaces import joined, merged
 from cell.products.tree import Node, Surface, fit_for_orders
 
 NOT_WANTED = "by --leave-out"
@@ -35,9 +35,7 @@ class Parts:
     united: list[str] = field(default_factory=list)
 
 
-def parts_of(
-    named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Sequence[str]
-) -> Parts:
+def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Sequence[str]) -> Parts:
     """Return the parts of a tree.
 
     Args:
@@ -61,7 +59,7 @@ def parts_of(
 
 
 def _among(name: str, names: Iterable[str]) -> str:
-    """Return which of several names is this one, or that of a sub-assembly around it; "" if none."""
+    """Return which of several names is this one, or that of a sub-assembly around it, or ""."""
     return next((n for n in names if name == n or name.startswith(f"{n}/")), "")
 
 
@@ -81,7 +79,7 @@ class _Shape:
         ]
         self.bodies = bodies[0]
         if len(bodies) > 1:
-            whole = bodies_of(merged(trimesh.util.concatenate(meshes)))
+            whole = bodies_of(merged(joined(meshes)))
             if sum(len(found.rejected) for found in bodies) > len(whole.rejected):
                 # Objects that are faces of a body, by colour or material: they close together only.
                 self.objects = [("", solid) for solid in whole.solids]

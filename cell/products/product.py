@@ -145,7 +145,9 @@ class Product:
         for part in parts:
             if (size := float(part.mesh.extents.max())) > LARGEST_PART:
                 reach = f"{LARGEST_PART:g} m at most"
-                raise BadPart(part.name, f"it is {size:.3g} m long: nothing here can hold it ({reach})")
+                raise BadPart(
+                    part.name, f"it is {size:.3g} m long: nothing here can hold it ({reach})"
+                )
         lacking = {
             "a contact model": [part.name for part in parts if part.model is None],
             "a place in the tray": [part.name for part in parts if part.X_TrayP is None],

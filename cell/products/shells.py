@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
-from cell.products.half_edges import HalfEdges, joined
+from cell.products.half_edges import HalfEdges, components
 from cell.products.repair import WELDS, welded, without_doubled, without_slivers, wound_alike
 
 
@@ -168,7 +168,7 @@ def _cut(vertices: np.ndarray, faces: np.ndarray) -> Iterator[tuple[np.ndarray, 
     # Corner 3 f + k is that at the start of half-edge 3 f + k; two half-edges run oppositely.
     following = np.arange(3 * len(faces)).reshape(-1, 3)[:, [1, 2, 0]].ravel()
     ends = [np.column_stack([wedges[:, i], following[wedges[:, 1 - i]]]) for i in (0, 1)]
-    corner = joined(3 * len(faces), np.concatenate(ends))
+    corner = components(3 * len(faces), np.concatenate(ends))
     points = np.empty((corner.max() + 1, 3))
     points[corner] = vertices[faces.ravel()]
     cut = corner.reshape(-1, 3)

@@ -59,7 +59,8 @@ class StepText:
         return {number: spans for number, spans in entities.items() if len(spans) >= least}
 
     def _text(self, span: tuple[int, int]) -> str:
-        return decoded(self._data[slice(*span)])
+        tokens = ARGUMENT.findall(self._data[slice(*span)])  # The argument, and comments.
+        return decoded(next((token for token in tokens if token.startswith(b"'")), b"$"))
 
     def _references(self, span: tuple[int, int]) -> list[int]:
         return [int(number) for number in REFERENCE.findall(self._data[slice(*span)])]
@@ -100,8 +101,10 @@ class StepText:
         return [number for number in self.products if number not in used]
 
     def with_keys(self) -> bytes:
-        """Return the file with each instance named "#" and its number: what is made of it is known
-        by these keys, whatever names are shared or lacking."""
+        """Return the file with each instance named "#" and the number of its entity.
+
+        What OpenCASCADE makes of an instance is known by this key, whatever names are shared.
+        """
         pieces, at = [], 0
         for number, usage in sorted(self.usages.items(), key=lambda item: item[1].name_at):
             start, end = usage.name_at

@@ -1,4 +1,4 @@
-"""The tree of a CAD file: sub-assemblies, the instances in them, and names as a person gives them."""
+"""The tree of a CAD file: sub-assemblies, what is in them, and names as a person gives them."""
 
 from __future__ import annotations
 
@@ -64,7 +64,6 @@ class Node:
     def name(self) -> str:
         """The name of the instance, else that of its product; "" if the author named neither."""
         return self.given or self.product
-
 
     def moved(self, X: np.ndarray) -> Node:
         """Return the tree with its poses multiplied by X (4, 4) from the left."""
