@@ -50,7 +50,9 @@ def taken_apart(surface: trimesh.Trimesh) -> Apart:
         return Apart((surface,), sound=True)
     shells: list[trimesh.Trimesh] = []
     corners, dropped, widest, turned = 0, 0, 0.0, False
-    for distance in (0.0, *WELDS):
+    # Where corners coincide in one face already, others nearly do: as it is, it would stay thin.
+    has_slivers = len(without_slivers(faces)) < len(faces)
+    for distance in WELDS if has_slivers else (0.0, *WELDS):
         had = len(np.unique(faces)), len(faces)
         if distance:
             vertices, faces = welded(vertices, faces, distance)
