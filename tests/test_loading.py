@@ -264,3 +264,17 @@ def test_step_is_tessellated_as_finely_as_the_tolerance_asks_for(radius, tmp_pat
     facets = int((np.abs(mesh.vertices[:, 2]) < 1e-9).sum())
     step = min(FACET_ANGLE, 2.0 * np.arccos(1.0 - DEFLECTION / radius))
     assert 2.0 * np.pi / step <= facets <= 2.2 * 2.0 * np.pi / step
+
+
+def test_a_given_tolerance_makes_step_coarser_but_not_by_more_than_a_tenth_of_it(tmp_path):
+    file, radius = StepFile(), 40.0
+    file.product("rod", "ADVANCED_BREP_SHAPE_REPRESENTATION", [file.world(), file.rod(radius, 3.0)])
+    (tmp_path / "rod.step").write_text(file.text())
+    fine, coarse = (
+        load_product(tmp_path / "rod.step", ReadOptions(tolerance=tolerance)).parts["rod"].mesh
+        for tolerance in (1e-5, 1e-3)
+    )
+    assert len(fine.faces) > 2.5 * len(coarse.faces)
+    for mesh, deflection in ((fine, DEFLECTION), (coarse, 0.1)):
+        facets = int((np.abs(mesh.vertices[:, 2]) < 1e-9).sum())
+        assert radius * (1.0 - np.cos(np.pi / facets)) <= deflection
