@@ -141,6 +141,15 @@ def test_bodies_of_a_file_are_said_or_split(tmp_path: Path) -> None:
     assert list(fewer.parts) == ["feet_1", "feet_3", "feet_4", "plate"]
 
 
+def test_split_takes_no_name_that_a_file_has(tmp_path: Path) -> None:
+    two = [in_mm(CUBE), in_mm(CUBE.translate([50, 0, 0]))]
+    trimesh.util.concatenate(two).export(tmp_path / "foot.stl")
+    in_mm(SLAB).export(tmp_path / "foot_1.stl")
+    product = load_product(tmp_path, ReadOptions("mm", split=True))
+    assert list(product.parts) == ["foot_1", "foot_2", "foot_3"]
+    assert 1e9 * product.parts["foot_1"].mesh.volume == pytest.approx(4000)
+
+
 def test_bodies_that_touch_along_an_edge_are_closed(tmp_path: Path) -> None:
     touching = [in_mm(CUBE), in_mm(CUBE.translate([10, 10, 0]))]
     trimesh.util.concatenate(touching).export(tmp_path / "stack.stl")
@@ -212,12 +221,16 @@ def test_shapes_in_other_files_are_read_from_beside_the_assembly(tmp_path: Path)
 
 
 def test_assembling_cad_says_what_works(mixed: Path, capsys: pytest.CaptureFixture) -> None:
-    for given in (mixed, mixed / "clamp.stp"):
+    for given, needs in ((mixed, " --units mm"), (mixed / "clamp.stp", "")):
         with pytest.raises(InputError, match="can be planned, but not assembled"):
             require_product_file(given)
         assert main(["assemble", str(given), "--out", str(mixed / "out")]) == 2
         (line,) = capsys.readouterr().err.splitlines()
-        assert f"soft-jig plan {given}" in line and "'model'" in line and "'tray_pose'" in line
+        assert (
+            f": soft-jig plan {given}{needs} plans it" in line
+            and "'model'" in line
+            and "'tray_pose'" in line
+        )
         assert not (mixed / "out").exists()
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from step_files import StepFile, StepTree
+from step_files import SOLIDS, StepFile, StepTree
 from tiny_products import box
 
 from cell.errors import BadPart, InputError, UnknownName
@@ -224,3 +224,31 @@ def test_solids_of_a_product_are_one_part_or_several(tmp_path: Path) -> None:
     parts = load(tmp_path, file, split=True).parts
     assert list(parts) == [f"feet_{k}_{body}" for k in (1, 2) for body in (1, 2, 3)]
     assert parts["feet_2_3"].mesh.bounds[0] == pytest.approx([30e-3, 50e-3, 0], abs=1e-8)
+
+
+def test_an_assembly_may_have_a_solid_of_its_own(tmp_path: Path) -> None:
+    file = StepTree()
+    pin, place = file.part("pin", CUBE), file.world((20, 0, 0))
+    host = file.product("host", SOLIDS, [file.world(), file.solid(SLAB), place])
+    file.instance("", host, pin, (file.world(), place))
+    assert list(load(tmp_path, file).parts) == ["host", "pin"]
+    file.assembly("top", ("", host, (0, 0, 0)), ("", host, (0, 50, 0)))
+    parts = load(tmp_path, file).parts
+    assert list(parts) == ["host_1/host", "host_1/pin", "host_2/host", "host_2/pin"]
+
+
+def test_an_instance_that_is_placed_nowhere_is_named(tmp_path: Path) -> None:
+    file = StepTree()
+    pin, base = file.part("pin", CUBE), file.part("base", SLAB)
+    whole = file.assembly("whole", ("", base, (0, 0, 0)))
+    file.add(f"NEXT_ASSEMBLY_USAGE_OCCURRENCE('1','lost one','',{whole[0]},{pin[0]},$)")
+    product = load(tmp_path, file)
+    assert list(product.parts) == ["base"]
+    assert product.left_out == (LeftOut("lost_one", "no shape in the file"),)
+
+
+def test_products_outside_of_any_assembly_are_parts(tmp_path: Path) -> None:
+    file = StepTree()
+    file.part("one", CUBE)
+    file.part("two", SLAB)
+    assert list(load(tmp_path, file).parts) == ["one", "two"]

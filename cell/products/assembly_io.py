@@ -93,9 +93,12 @@ class _StepTree:
             for number, usage in self._text.usages.items()
             if number not in self._seen
         ]
+        if len(children) == 1 and children[0].children:
+            children = [replace(children[0], children=(*children[0].children, *lost))]
+            lost = []
         return replace(tree, children=(*children, *lost))
 
-    def _renamed(self, node: Node, definition: int = 0) -> Node:
+    def _renamed(self, node: Node, definition: int = 0, above: str = "") -> Node:
         key = node.given.removeprefix("#") if node.given.startswith("#") else ""
         if usage := self._text.usages.get(int(key) if key.isdigit() else 0):
             self._seen.add(int(key))
@@ -105,7 +108,10 @@ class _StepTree:
         else:
             names = node.given, node.product
         given, product = map(authored, names)
-        children = tuple(self._renamed(child) for child in node.children)
+        if not usage and not given and not product:
+            product = above  # An assembly may have a solid of its own.
+        own = self._text.products.get(definition, "")
+        children = tuple(self._renamed(child, above=authored(own)) for child in node.children)
         node = replace(node, given=given, product=product, children=children)
         if not node.children and not node.surfaces and definition in self._documents:
             return self._from_documents(node, self._documents[definition])

@@ -52,7 +52,9 @@ def read_folder(folder: Path, options: ReadOptions) -> Contents:
     files = [file for file in files if file not in referred] or files  # If they refer in a circle.
     if not files:
         kinds = ", ".join(CAD_SUFFIXES)
-        raise InputError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
+        held = ", ".join(thing.name for thing in left_out[:12])
+        but = f" It holds {held}." if held else ""
+        raise InputError(f"Folder '{folder}' holds no mesh; supported: {kinds}.{but}")
     stems: dict[str, Path] = {}
     for file in files:
         if other := stems.get(file.stem):

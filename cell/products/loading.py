@@ -14,7 +14,14 @@ from cell.paths import MODELS
 from cell.products.fields import one_of
 from cell.products.folder import CAD_SUFFIXES, Contents, read_file, read_folder
 from cell.products.identical import group_identical, identical_parts
-from cell.products.mesh_io import LARGEST_PART, REPAIR, SMALLEST_PART, meters_per_unit
+from cell.products.mesh_io import (
+    LARGEST_PART,
+    MESH_SUFFIXES,
+    REPAIR,
+    SMALLEST_PART,
+    UNIT_SUFFIXES,
+    meters_per_unit,
+)
 from cell.products.parts import NOT_WANTED, Parts, parts_of
 from cell.products.product import LeftOut, Part, Product
 from cell.products.product_file import read_product
@@ -83,11 +90,19 @@ def require_product_file(name_or_path: str | Path) -> None:
         return  # What does not exist is named when it is read.
     if not path.is_dir() and path.suffix.lower() not in CAD_SUFFIXES:
         raise _unsupported(path)
+    plan = f"soft-jig plan {path}" + (" --units mm" if _needs_unit(path) else "")
     raise InputError(
-        f"'{path}' can be planned, but not assembled in the twin: soft-jig plan {path} plans it; "
+        f"'{path}' can be planned, but not assembled in the twin: {plan} plans it; "
         "to assemble takes a product file (.yaml) in which every part has a 'model' (contact "
         f"geometry) and a 'tray_pose', such as models/products/{product_names()[0]}.yaml."
     )
+
+
+def _needs_unit(path: Path) -> bool:
+    """Return whether a mesh in the input states no unit."""
+    files = path.iterdir() if path.is_dir() else [path]
+    plain = set(MESH_SUFFIXES) - set(UNIT_SUFFIXES)
+    return any(file.suffix.lower() in plain for file in files)
 
 
 def _from_product_file(name_or_path: str | Path, options: ReadOptions) -> Product:

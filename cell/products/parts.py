@@ -43,6 +43,8 @@ def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Seque
         split: Whether each body is a part.
         leave_out: Names of parts and of sub-assemblies, of which none is planned.
     """
+    named = list(named)
+    names = {name for name, _ in named}
     parts, known = Parts(), {}
     for name, node in named:
         if unwanted := _among(name, leave_out):
@@ -54,7 +56,27 @@ def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Seque
             key = (*(id(surface.mesh) for surface in node.surfaces), abs(round(scale, 6)))
             if key not in known:
                 known[key] = _Shape(node.surfaces)
-            _add(parts, name, known[key], node.surfaces[0].X_AP, split, leave_out)
+            shape, X_AP = known[key], node.surfaces[0].X_AP
+            if shape.bodies.rejected:
+                parts.left_out.append(_left_out(name, shape, X_AP))
+            if shape.one is None:
+                continue
+            if split and len(shape.objects) > 1:
+                labels = _body_names(name, [label for label, _ in shape.objects], names)
+                bodies = list(zip(labels, (solid for _, solid in shape.objects), strict=True))
+                names.update(labels)
+            else:
+                bodies = [(name, shape.one)]
+            if len(shape.objects) > len(bodies):
+                parts.several[name] = len(shape.objects)
+                parts.united += [name] if shape.is_united else []
+            for part, mesh in bodies:
+                if unwanted := _among(part, leave_out):
+                    parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
+                    continue
+                parts.meshes[part] = shape.placed(mesh, X_AP)
+                if shape.bodies.repair:
+                    parts.repairs[part] = shape.bodies.repair
     return parts
 
 
@@ -100,42 +122,13 @@ class _Shape:
         return moved if np.array_equal(X, np.eye(4)) else moved.apply_transform(X)
 
 
-def _add(
-    parts: Parts,
-    name: str,
-    shape: _Shape,
-    X_AP: np.ndarray,
-    split: bool,
-    leave_out: Sequence[str],
-) -> None:
-    """Add a part, or a part for each of its bodies, and what is no solid in it."""
-    if shape.bodies.rejected:
-        parts.left_out.append(_left_out(name, shape, X_AP))
-    if shape.one is None:
-        return
-    meshes = {name: shape.one}
-    if split and len(shape.objects) > 1:
-        names = _body_names(name, [label for label, _ in shape.objects], {*parts.meshes})
-        meshes = dict(zip(names, (solid for _, solid in shape.objects), strict=True))
-    elif len(shape.objects) > 1:
-        parts.several[name] = len(shape.objects)
-        parts.united += [name] if shape.is_united else []
-    for part, mesh in meshes.items():
-        if unwanted := _among(part, leave_out):
-            parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
-            continue
-        parts.meshes[part] = shape.placed(mesh, X_AP)
-        if shape.bodies.repair:
-            parts.repairs[part] = shape.bodies.repair
-
-
 def _body_names(name: str, labels: Sequence[str], taken: set[str]) -> list[str]:
     """Return names for the bodies of a part: those of objects, else its own with numbers."""
     folder = name[: name.rfind("/") + 1]
     stems = [folder + fit_for_orders(label) if label else name for label in labels]
     names: list[str] = []
     for stem, label in zip(stems, labels, strict=True):
-        alone = bool(label) and stems.count(stem) == 1 and stem not in taken
+        alone = bool(label) and stems.count(stem) == 1 and stem not in taken - {name}
         number = 1
         while not alone and (f"{stem}_{number}" in names or f"{stem}_{number}" in taken):
             number += 1
