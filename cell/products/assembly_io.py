@@ -82,6 +82,7 @@ class _StepTree:
         self._above = (*above, file.resolve())
         self._documents = text.documents()
         self._seen: set[int] = set()
+        self._loaded: dict[Path, Node] = {}
 
     def named(self, tree: Node) -> Node:
         """Return the tree with names by the author, and with every instance of the file in it."""
@@ -127,8 +128,9 @@ class _StepTree:
             elif file.suffix.lower() not in ASSEMBLY_SUFFIXES:
                 reason = f"its shape is in '{name}', which is not a STEP file"
             else:
-                tree = load_assembly(file, self._tolerance, self._above)
-                found += [child.moved(node.X_AP) for child in tree.children]
+                if file not in self._loaded:
+                    self._loaded[file] = load_assembly(file, self._tolerance, self._above)
+                found += [child.moved(node.X_AP) for child in self._loaded[file].children]
                 continue
             found.append(Node(product=node.name, lacking=reason))
         if len(found) == 1 and not found[0].children:
