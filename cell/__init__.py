@@ -46,6 +46,7 @@ if TYPE_CHECKING:
     from cell.products.joints import Fit, Press, Rest, Screw
     from cell.products.loading import load_product
     from cell.products.product import Grasp, Part, Product
+    from cell.products.read_options import ReadOptions
     from cell.simulation import events
     from cell.simulation.phase import (
         Follow,
@@ -95,6 +96,7 @@ __all__ = [
     "PhaseFailed",
     "Press",
     "Product",
+    "ReadOptions",
     "Rest",
     "RunFailure",
     "Screw",
@@ -148,6 +150,7 @@ _HOME = {
     "PhaseFailed": "cell.simulation.phase",
     "Press": "cell.products.joints",
     "Product": "cell.products.product",
+    "ReadOptions": "cell.products.read_options",
     "Rest": "cell.products.joints",
     "RunFailure": "cell.errors",
     "Screw": "cell.products.joints",

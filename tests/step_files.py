@@ -11,6 +11,9 @@ UNITS = {
     "mm": "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT(.MILLI.,.METRE.))",
     "m": "(LENGTH_UNIT()NAMED_UNIT(*)SI_UNIT($,.METRE.))",
 }
+SOLIDS = "ADVANCED_BREP_SHAPE_REPRESENTATION"
+
+Place = tuple[float, float, float]
 
 
 class StepFile:
@@ -23,7 +26,13 @@ class StepFile:
         self.definition_context = self.add(
             f"PRODUCT_DEFINITION_CONTEXT('part definition',{application},'design')"
         )
-        length = self.add(UNITS[unit])
+        length = self.add(UNITS["mm" if unit == "in" else unit])
+        if unit == "in":
+            size = self.add(f"LENGTH_MEASURE_WITH_UNIT(LENGTH_MEASURE(25.4),{length})")
+            none = self.add("DIMENSIONAL_EXPONENTS(1.,0.,0.,0.,0.,0.,0.)")
+            length = self.add(
+                f"(CONVERSION_BASED_UNIT('INCH',{size})LENGTH_UNIT()NAMED_UNIT({none}))"
+            )
         angle = self.add("(NAMED_UNIT(*)PLANE_ANGLE_UNIT()SI_UNIT($,.RADIAN.))")
         solid = self.add("(NAMED_UNIT(*)SI_UNIT($,.STERADIAN.)SOLID_ANGLE_UNIT())")
         rounding = self.add(
@@ -73,6 +82,14 @@ class StepFile:
         faces = [self._face(corners, vertices, edges, t) for t in np.array(mesh.tri_verts, int)]
         shell = self.add(f"CLOSED_SHELL('',({','.join(faces)}))")
         return self.add(f"MANIFOLD_SOLID_BREP('',{shell})")
+
+    def sheet(self, shape: Manifold) -> str:
+        """Add the surface of a solid without its last face."""
+        closed = self._lines[int(self.solid(shape)[1:]) - 2]
+        faces = closed.partition("((")[2] if "((" in closed else closed.partition(",(")[2]
+        faces = faces.rstrip(");").rpartition(",")[0]
+        shell = self.add(f"OPEN_SHELL('',({faces}))")
+        return self.add(f"SHELL_BASED_SURFACE_MODEL('',({shell}))")
 
     def rod(self, radius: float, height: float) -> str:
         """Add a cylinder on the plane z = 0, bounded by true circles."""
@@ -156,6 +173,36 @@ class StepFile:
             f"SHAPE_REPRESENTATION_RELATIONSHIP())"
         )
         self.add(f"CONTEXT_DEPENDENT_SHAPE_REPRESENTATION({relation},{shape})")
+
+
+class StepTree(StepFile):
+    """A STEP file of products, in assemblies of any depth; everything is drawn at the origin."""
+
+    def part(self, name: str, *shapes: Manifold) -> tuple[str, str]:
+        """Add a product of some solids; without any it has no shape."""
+        kind = SOLIDS if shapes else "SHAPE_REPRESENTATION"
+        return self.product(name, kind, [self.world(), *(self.solid(s) for s in shapes)])
+
+    def assembly(
+        self, name: str, *instances: tuple[str, tuple[str, str], Place]
+    ) -> tuple[str, str]:
+        """Add an assembly of instances (name, product, place)."""
+        places = [self.world(place) for _, _, place in instances]
+        whole = self.product(name, "SHAPE_REPRESENTATION", [self.world(), *places])
+        for (given, product, _), place in zip(instances, places, strict=True):
+            self.instance(given, whole, product, (self.world(), place))
+        return whole
+
+    def refer(self, product: tuple[str, str], file: str) -> None:
+        """Say that a product's shape is in another file, as AP214 exporters do."""
+        kind = self.add("DOCUMENT_TYPE('geometry')")
+        document = self.add(f"DOCUMENT_FILE('{file}','','',{kind},'',$)")
+        role = self.add("IDENTIFICATION_ROLE('external document id and location',$)")
+        source = self.add("EXTERNAL_SOURCE(IDENTIFIER(''))")
+        self.add(
+            f"APPLIED_EXTERNAL_IDENTIFICATION_ASSIGNMENT('{file}',{role},{source},({document}))"
+        )
+        self.add(f"APPLIED_DOCUMENT_REFERENCE({document},'',({product[0]}))")
 
 
 def step_assembly(

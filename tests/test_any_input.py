@@ -16,6 +16,7 @@ import cell.products.loading as loading
 from cell.errors import BadPart, InputError, UnknownName
 from cell.products.identical import handedness, identical_parts
 from cell.products.loading import DEFAULT_DENSITY, load_product
+from cell.products.read_options import ReadOptions
 from experiments.cli.main import main
 
 PLATE = box((40, 40, 10), (-20, -20, 0)) - rod(6, -1, 11, 32) - rod(6, -1, 11).translate([12, 0, 0])
@@ -75,8 +76,11 @@ def test_gltf_keeps_names_and_poses(tmp_path: Path) -> None:
     assert list(product.parts) == ["left_pin", "right_pin"]
     assert product.parts["right_pin"].mesh.centroid[0] == pytest.approx(0.01)
     assert product.parts["left_pin"].mesh.volume == pytest.approx(pin.volume)
-    with pytest.raises(InputError, match="states its own units"):
-        load_product(tmp_path / "pins.glb", "mm")
+    small = load_product(tmp_path / "pins.glb", ReadOptions("mm"))
+    np.testing.assert_allclose(small.parts["left_pin"].mesh.extents, [4e-6, 4e-6, 1e-5], rtol=1e-5)
+    assert (
+        "warning: 'pins.glb' states m, and is taken as mm, because --units says so" in small.notes
+    )
 
 
 @pytest.mark.parametrize("suffix", ["step", "glb"])
@@ -93,7 +97,7 @@ def test_a_broken_assembly_file_is_one_line(tmp_path: Path, text: str, suffix, c
 def test_densities_are_of_parts_or_of_all(tmp_path: Path) -> None:
     file = step_file(tmp_path)
     plain = load_product(file)
-    product = load_product(file, densities={"": 1000.0, "base": 7850.0})
+    product = load_product(file, ReadOptions(densities={"": 1000.0, "base": 7850.0}))
     volume = {name: float(part.mesh.volume) for name, part in product.parts.items()}
     assert product.parts["base"].mass == pytest.approx(7850.0 * volume["base"])
     assert product.parts["pin"].mass == pytest.approx(1000.0 * volume["pin"])
@@ -101,9 +105,9 @@ def test_densities_are_of_parts_or_of_all(tmp_path: Path) -> None:
     assert any("density of all parts" in remark for remark in plain.remarks)
     assert not any("density" in remark for remark in product.remarks)
     with pytest.raises(UnknownName, match="No part 'bas'.*'base'"):
-        load_product(file, densities={"bas": 1.0})
+        load_product(file, ReadOptions(densities={"bas": 1.0}))
     with pytest.raises(InputError, match="above zero"):
-        load_product(file, densities={"": 0.0})
+        load_product(file, ReadOptions(densities={"": 0.0}))
 
 
 def cube() -> trimesh.Trimesh:
@@ -120,7 +124,7 @@ def test_duplicated_corners_are_welded_and_said(tmp_path: Path) -> None:
     corners = cube().triangles.reshape(-1, 3)
     corners = corners + np.random.default_rng(0).uniform(-2e-5, 2e-5, corners.shape)
     soup = trimesh.Trimesh(corners, np.arange(36).reshape(-1, 3), process=False)
-    product = load_product(exported(soup, tmp_path), "mm")
+    product = load_product(exported(soup, tmp_path), ReadOptions("mm"))
     mesh = product.parts["cube"].mesh
     assert mesh.is_volume and len(mesh.vertices) == 8
     assert mesh.volume == pytest.approx(8e-6, rel=1e-6)
@@ -132,12 +136,12 @@ def test_doubled_and_turned_faces_are_repaired_and_said(tmp_path: Path) -> None:
     doubled = trimesh.Trimesh(
         whole.vertices, np.vstack([whole.faces, whole.faces[:3]]), process=False
     )
-    product = load_product(exported(doubled, tmp_path), "mm")
+    product = load_product(exported(doubled, tmp_path), ReadOptions("mm"))
     assert any("3 degenerate or doubled faces removed" in r for r in product.remarks)
     faces = np.array(whole.faces)
     faces[4] = faces[4][::-1]
     product = load_product(
-        exported(trimesh.Trimesh(whole.vertices, faces, process=False), tmp_path), "mm"
+        exported(trimesh.Trimesh(whole.vertices, faces, process=False), tmp_path), ReadOptions("mm")
     )
     assert product.parts["cube"].mesh.volume == pytest.approx(8e-6)
     assert any("turned outwards" in r for r in product.remarks)
@@ -146,7 +150,7 @@ def test_doubled_and_turned_faces_are_repaired_and_said(tmp_path: Path) -> None:
 def test_a_hole_is_not_guessed_shut(tmp_path: Path) -> None:
     open_cube = trimesh.Trimesh(cube().vertices, cube().faces[1:], process=False)
     with pytest.raises(BadPart, match=r"'cube'.*not watertight: 3 open edges, one of them at \("):
-        load_product(exported(open_cube, tmp_path), "mm")
+        load_product(exported(open_cube, tmp_path), ReadOptions("mm"))
 
 
 def test_identical_parts_are_found_in_any_pose() -> None:
@@ -170,8 +174,8 @@ def test_grouping_is_opt_in_and_keeps_declared_groups(tmp_path: Path) -> None:
     file = step_file(tmp_path)
     assert load_product(file).groups == {}
     assert any("identical parts: pin, pin_2" in r for r in load_product(file).remarks)
-    assert load_product(file, group=True).groups == {"pins": ("pin", "pin_2")}
-    bolts = load_product("motor_unit", group=True)
+    assert load_product(file, ReadOptions(group=True)).groups == {"pins": ("pin", "pin_2")}
+    bolts = load_product("motor_unit", ReadOptions(group=True))
     assert list(bolts.groups) == ["bolts"] and bolts.remarks == ()
 
 
@@ -198,7 +202,7 @@ def test_up_is_an_option_where_no_file_states_it(tmp_path: Path, up, fixed, caps
     [
         ({}, ["--units", "mm"], 2, "holds no mesh; supported: .obj"),
         ({"low": LOW, "high": HIGH}, [], 2, "states no unit of length: add --units"),
-        ({"low": LOW, "high": HIGH}, ["--units", "m"], 2, "'high'.*wrong units"),
+        ({"low": LOW, "high": HIGH}, ["--units", "m"], 0, "high, low up to 20 m long.*wrong units"),
         ({"low": LOW, "high": HIGH}, ["--units", "feet"], 2, "No unit 'feet'"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm"], 0, "Tolerance 0.05 mm, by default"),
         ({"low": LOW}, ["--units", "mm"], 0, "'low' is the only part: there is nothing"),
@@ -246,8 +250,8 @@ def test_two_files_of_one_name_and_broken_files_are_refused_by_name(tmp_path, ca
     assert len(lines) == 2 and all("Part 'low'" in line for line in lines)
 
 
-def test_too_many_parts_are_refused_with_the_reason(tmp_path, monkeypatch) -> None:
-    monkeypatch.setattr(loading, "MOST_PARTS", 1)
+def test_many_parts_are_planned_with_a_remark(tmp_path, monkeypatch) -> None:
+    monkeypatch.setattr(loading, "MANY_PARTS", 1)
     folder_of(tmp_path, {"low": LOW, "high": HIGH})
-    with pytest.raises(InputError, match="has 2 parts, and plans are for up to 1: plan its sub"):
-        load_product(tmp_path, "mm")
+    notes = load_product(tmp_path, ReadOptions("mm")).notes
+    assert "2 parts: matrices of more than 1 take minutes" in notes

@@ -8,6 +8,7 @@ from types import ModuleType
 import pytest
 
 from cell.errors import BadOrder, CellError
+from cell.products.read_options import ReadOptions
 from experiments.cli.main import main, one_line, parse
 from experiments.plan.options import PlanOptions
 
@@ -50,8 +51,18 @@ def test_plan_gets_its_options(calls: list[dict], tmp_path: Path) -> None:
         "0.02",
         "--up=-z",
     ]
+    options += ["--split", "--depth", "2", "--leave-out", "b", "--leave-out", "c/d"]
     assert main(["plan", "folder", *options, "--no-cache", "--no-html"]) == 0
-    expected = PlanOptions("in", {"": 7850.0, "a": 1000.0}, True, 1e-3 * 0.02, up="-z")
+    read = ReadOptions(
+        units="in",
+        densities={"": 7850.0, "a": 1000.0},
+        group=True,
+        split=True,
+        leave_out=("b", "c/d"),
+        depth=2,
+        tolerance=1e-3 * 0.02,
+    )
+    expected = PlanOptions(read, 1e-3 * 0.02, up="-z")
     (call,) = calls
     assert call == dict(
         product="folder", order=("a", "b"), options=expected, explain=True, html=False

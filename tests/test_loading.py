@@ -8,9 +8,10 @@ import trimesh
 from step_files import StepFile
 
 from cell.errors import BadOrder, BadPart, InputError, UnknownName
-from cell.products.assembly_io import DEFLECTION, FACET_ANGLE, load_assembly
+from cell.products.assembly_io import DEFLECTION, FACET_ANGLE
 from cell.products.loading import load_product, product_names
 from cell.products.mesh_io import MESH_SUFFIXES
+from cell.products.read_options import ReadOptions
 
 GOOD = """
 name: pair
@@ -96,7 +97,7 @@ def test_yaml_reads_units_poses_and_masses(folder: Path) -> None:
 
 @pytest.mark.parametrize(("units", "size"), [("mm", 0.02), ("cm", 0.2)])
 def test_folder_is_a_product_in_assembled_pose(folder: Path, units: str, size: float) -> None:
-    product = load_product(folder, units=units)
+    product = load_product(folder, ReadOptions(units=units))
     assert list(product.parts) == ["block", "peg"]
     np.testing.assert_allclose(product.parts["block"].mesh.extents, [size] * 3)
     assert product.parts["peg"].mesh.centroid[2] == pytest.approx(25 / 20 * size)
@@ -109,7 +110,7 @@ def test_every_supported_type_is_read(tmp_path: Path, suffix: str) -> None:
     scale = 1e-3 if suffix == ".glb" else 1.0
     cube = trimesh.creation.box((20 * scale,) * 3)
     cube.export(tmp_path / f"cube{suffix}")
-    part = load_product(tmp_path, None if suffix == ".glb" else "mm").parts["cube"]
+    part = load_product(tmp_path, ReadOptions(None if suffix == ".glb" else "mm")).parts["cube"]
     assert part.mesh.is_volume
     np.testing.assert_allclose(part.mesh.extents, [0.02] * 3, rtol=1e-6)
 
@@ -118,7 +119,9 @@ def test_inward_surface_is_turned_outwards(tmp_path: Path) -> None:
     cube = trimesh.creation.box((20, 20, 20))
     cube.invert()
     cube.export(tmp_path / "cube.ply")
-    assert load_product(tmp_path, "mm").parts["cube"].mesh.volume == pytest.approx(8e-6)
+    assert load_product(tmp_path, ReadOptions("mm")).parts["cube"].mesh.volume == pytest.approx(
+        8e-6
+    )
 
 
 def test_unknown_product_names_the_nearest() -> None:
@@ -138,27 +141,35 @@ def test_unsupported_input_lists_what_is(folder: Path) -> None:
 
 def test_unknown_unit_lists_the_known(folder: Path) -> None:
     with pytest.raises(UnknownName, match="No unit 'mn'.*cm, in, m, mm"):
-        load_product(folder, units="mn")
+        load_product(folder, ReadOptions("mn"))
     with pytest.raises(InputError, match="states its own units"):
-        load_product(write(folder, GOOD), units="cm")
+        load_product(write(folder, GOOD), ReadOptions("cm"))
 
 
 @pytest.mark.parametrize(
-    ("units", "message"), [("m", "block.*larger than the cell: wrong units"), ("in", None)]
+    ("units", "scale", "remark"),
+    [
+        ("m", 1.0, "block, peg up to 30 m long: planned, but nothing here can hold more than 1 m"),
+        ("in", 1.0, None),
+        ("mm", 1e-3, "block down to 20 micrometres long: wrong units?"),
+    ],
 )
-def test_implausible_size_is_refused(folder: Path, units: str, message: str | None) -> None:
-    if message is None:
-        assert load_product(folder, units=units).parts["block"].mesh.extents[0] < 1.0
-        return
-    with pytest.raises(BadPart, match=message):
-        load_product(folder, units=units)
+def test_size_has_no_limits_in_planning_but_is_remarked(
+    tmp_path: Path, units: str, scale: float, remark: str | None
+) -> None:
+    for name, size in (("block", (20, 20, 20)), ("peg", (5, 5, 30 if scale == 1.0 else 900))):
+        trimesh.creation.box(scale * np.array(size)).export(tmp_path / f"{name}.stl")
+    product = load_product(tmp_path, ReadOptions(units=units))
+    said = [note for note in product.notes if " long: " in note]
+    assert (remark is None and not said) or (remark is not None and remark in said[0])
+    assert len(said) <= 1
 
 
-def test_tiny_part_is_refused(tmp_path: Path) -> None:
-    trimesh.creation.box((0.02,) * 3).export(tmp_path / "cube.stl")
-    with pytest.raises(BadPart, match="cube.*micrometres.*wrong units"):
-        load_product(tmp_path, "mm")
-    assert load_product(tmp_path, units="m")
+def test_what_nothing_can_hold_is_not_assembled(folder: Path) -> None:
+    """The limit on size belongs to execution."""
+    trimesh.creation.box((2000, 20, 20)).export(folder / "block.stl")
+    with pytest.raises(BadPart, match=r"'block'.*2 m long: nothing here can hold it \(1 m at most"):
+        load_product(write(folder, GOOD)).check_simulable()
 
 
 def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
@@ -170,16 +181,16 @@ def test_unsound_meshes_are_refused(tmp_path: Path) -> None:
     for mesh, reason in [(hole, "not watertight"), (flat, "no volume|not watertight")]:
         mesh.export(tmp_path / "part.obj")
         with pytest.raises(BadPart, match=f"'part'.*({reason})"):
-            load_product(tmp_path, "mm")
+            load_product(tmp_path, ReadOptions("mm"))
     (tmp_path / "part.obj").write_text("v 0 0\nf nonsense\n")
     with pytest.raises(BadPart, match="'part'"):
-        load_product(tmp_path, "mm")
+        load_product(tmp_path, ReadOptions("mm"))
 
 
 def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -> None:
     trimesh.creation.box((5, 5, 5)).export(folder / "peg.obj")
     with pytest.raises(BadPart, match="'peg'.*two files"):
-        load_product(folder, "mm")
+        load_product(folder, ReadOptions("mm"))
     empty = tmp_path / "empty"
     empty.mkdir()
     with pytest.raises(InputError, match="no mesh; supported: .obj"):
@@ -200,7 +211,7 @@ def test_empty_and_ambiguous_folders_are_refused(folder: Path, tmp_path: Path) -
         ("mesh: block.stl", "model: motor", "'block'.*remove 'mass_kg'"),
         ("peg: {mesh", "block: {mesh", "'block' occurs twice"),
         ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 20]", "assembled_pose.xyz_mm.*three numbers"),
-        ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 0, 20000]", "outside of the cell"),
+        ("peg: {mesh", "peg: {tray_pose: {xyz_mm: [0, 0, 20000]}, mesh", "outside of the cell"),
         ("xyz_mm: [0, 0, 20]", "xyz_mm: [0, 0, .nan]", "expected a number"),
         ("name: pair", "name: pair\nup: up", "No axis 'up'"),
         ("name: pair", "name: pair\nunits: furlong", "No unit 'furlong'"),
@@ -249,7 +260,21 @@ def test_step_is_tessellated_as_finely_as_the_tolerance_asks_for(radius, tmp_pat
     file = StepFile()
     file.product("rod", "ADVANCED_BREP_SHAPE_REPRESENTATION", [file.world(), file.rod(radius, 3.0)])
     (tmp_path / "rod.step").write_text(file.text())
-    (mesh,) = load_assembly(tmp_path / "rod.step").values()
+    mesh = load_product(tmp_path / "rod.step").parts["rod"].mesh
     facets = int((np.abs(mesh.vertices[:, 2]) < 1e-9).sum())
     step = min(FACET_ANGLE, 2.0 * np.arccos(1.0 - DEFLECTION / radius))
     assert 2.0 * np.pi / step <= facets <= 2.2 * 2.0 * np.pi / step
+
+
+def test_a_given_tolerance_makes_step_coarser_but_not_by_more_than_a_tenth_of_it(tmp_path):
+    file, radius = StepFile(), 40.0
+    file.product("rod", "ADVANCED_BREP_SHAPE_REPRESENTATION", [file.world(), file.rod(radius, 3.0)])
+    (tmp_path / "rod.step").write_text(file.text())
+    fine, coarse = (
+        load_product(tmp_path / "rod.step", ReadOptions(tolerance=tolerance)).parts["rod"].mesh
+        for tolerance in (1e-5, 1e-3)
+    )
+    assert len(fine.faces) > 2.5 * len(coarse.faces)
+    for mesh, deflection in ((fine, DEFLECTION), (coarse, 0.1)):
+        facets = int((np.abs(mesh.vertices[:, 2]) < 1e-9).sum())
+        assert radius * (1.0 - np.cos(np.pi / facets)) <= deflection

@@ -1,97 +1,171 @@
-"""Reading assemblies from one file, STEP or glTF, as triangle meshes named by instance.
+"""Reading assemblies from one file, STEP or glTF, as a tree of parts with triangle meshes.
 
 OpenCASCADE, through ``cascadio``, converts STEP to glTF, which is in metres by its specification,
-whatever the unit of the STEP file.
+whatever the unit of the STEP file. Names are taken from the text of the STEP file.
 """
 
 from __future__ import annotations
 
-import io
 import os
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from itertools import chain, count
-from pathlib import Path
-
-import trimesh
+from dataclasses import replace
+from pathlib import Path, PureWindowsPath
 
 from cell.errors import InputError
-from cell.products.mesh_io import check_mesh, merged
+from cell.products.gltf import gltf_tree
+from cell.products.step_text import StepText
+from cell.products.tree import Node, authored
 
 GLTF_SUFFIX = ".glb"
-ASSEMBLY_SUFFIXES = (".step", ".stp", GLTF_SUFFIX)
+STEP_SUFFIXES = (".step", ".stp", ".p21")
+ASSEMBLY_SUFFIXES = (*STEP_SUFFIXES, GLTF_SUFFIX)
 
 DEFLECTION = 0.005
 """[mm] [D] a tenth of the usual tolerance on fits."""
+
+DEFLECTION_PER_TOLERANCE = 0.1
+"""[D] of the tolerance that a user gives: the same tenth."""
 
 FACET_ANGLE = 0.25
 """[rad] [D] for small circles. OpenCASCADE keeps to half of both limits [M]: 51 facets a turn have
 a sagitta of r/527, below the r/500 that counts as line to line even between parts of that size.
 From 1.3 mm on, ``DEFLECTION`` asks for more: 109 facets on a hole of 12 mm."""
 
-# Names that exporters generate for instances without one.
-GENERATED_NAME = re.compile(r"NAUO\d*|=>\[.*\]|\d*|Solid\d*|Open CASCADE.*", re.IGNORECASE)
 
+def load_assembly(file: Path, tolerance: float | None = None, above: tuple[Path, ...] = ()) -> Node:
+    """Read a file as a tree, in its assembled pose [m]; what it refers to is read from beside it.
 
-def load_assembly(file: Path) -> dict[str, trimesh.Trimesh]:
-    """Read every solid of a file, in its assembled pose [m], by the name of its instance.
-
-    An instance without a name takes that of its product; a name that is taken gets a number.
-    Characters other than letters, digits, ".", "-" and "_" become "_", so that names can be listed
-    in an order.
+    Args:
+        file: One of ``ASSEMBLY_SUFFIXES``.
+        tolerance: Gap that counts as contact [m], if STEP may be as coarse as that allows.
+        above: Files that refer to this one.
 
     Raises:
-        InputError: The file cannot be read, or holds no solid.
-        BadPart: A solid is open, flat, or implausibly large or small.
+        InputError: The file cannot be read.
     """
-    scene = _scene(file)
-    meshes: dict[str, trimesh.Trimesh] = {}
-    for node in scene.graph.nodes_geometry:
-        X_AP, geometry = scene.graph[node]
-        product = str(geometry)
-        shape = scene.geometry[product]
-        if not isinstance(shape, trimesh.Trimesh):
-            continue
-        label = product if GENERATED_NAME.fullmatch(str(node)) else str(node)
-        label = re.sub(r"[^\w.-]+", "_", label).strip("_") or "part"
-        names = chain([label], (f"{label}_{k}" for k in count(2)))
-        name = next(name for name in names if name not in meshes)
-        surface = merged(shape)
-        surface.apply_transform(X_AP)
-        meshes[name] = check_mesh(surface, name)
-    if not meshes:
-        raise InputError(f"'{file}' holds no solid.")
-    return dict(sorted(meshes.items(), key=lambda item: _natural(item[0])))
-
-
-def _scene(file: Path) -> trimesh.Scene:
-    """Return the content of a STEP or glTF file, in metres."""
     try:
         data = file.read_bytes()
     except OSError as error:
         raise InputError(f"'{file}' cannot be read: {error.strerror}.") from error
-    binary = data
-    if file.suffix.lower() != GLTF_SUFFIX and not (binary := _converted(data)):
+    if file.suffix.lower() == GLTF_SUFFIX:
+        return _authored(gltf_tree(data, file))
+    text = StepText(data)
+    deflection = DEFLECTION
+    if tolerance is not None:
+        deflection = max(deflection, 1e3 * DEFLECTION_PER_TOLERANCE * tolerance)
+    binary = _converted(text.with_keys(), deflection)
+    if not binary:
         raise InputError(f"'{file}' is not a STEP file that can be read.")
-    try:
-        scene = trimesh.load_scene(
-            io.BytesIO(binary), file_type="glb", process=False, merge_primitives=True
-        )
-    except Exception as error:  # The reader documents no exceptions of its own.
-        raise InputError(f"'{file}' is not a glTF file that can be read.") from error
-    if not scene.geometry:
-        raise InputError(f"'{file}' holds no solid.")
-    return scene
+    tree = gltf_tree(binary, file)
+    return _StepTree(file, text, tolerance, above).named(tree)
 
 
-def _converted(data: bytes) -> bytes:
-    """Return a STEP file as binary glTF; empty if it is not a STEP file."""
+def referred_files(file: Path) -> list[Path]:
+    """Return the files, beside a STEP file, in which it says that shapes of its products are."""
+    if file.suffix.lower() not in STEP_SUFFIXES:
+        return []
+    documents = StepText(file.read_bytes()).documents()
+    found = {_beside(file, name) for names in documents.values() for name in names}
+    return sorted(f for f in found if f is not None and f != file)
+
+
+class _StepTree:
+    """Names for the tree that OpenCASCADE made of a STEP file, and what it left out of it."""
+
+    def __init__(
+        self, file: Path, text: StepText, tolerance: float | None, above: tuple[Path, ...]
+    ) -> None:
+        self._file = file
+        self._text = text
+        self._tolerance = tolerance
+        self._above = (*above, file.resolve())
+        self._documents = text.documents()
+        self._seen: set[int] = set()
+        self._loaded: dict[Path, Node] = {}
+
+    def named(self, tree: Node) -> Node:
+        """Return the tree with names by the author, and with every instance of the file in it."""
+        roots = self._text.roots
+        only = roots[0] if len(roots) == len(tree.children) == 1 else 0
+        children = [self._renamed(child, only) for child in tree.children]
+        lost = [
+            Node(authored(usage.given), authored(usage.product), lacking="no shape in the file")
+            for number, usage in self._text.usages.items()
+            if number not in self._seen
+        ]
+        if len(children) == 1 and children[0].children:
+            children = [replace(children[0], children=(*children[0].children, *lost))]
+            lost = []
+        return replace(tree, children=(*children, *lost))
+
+    def _renamed(self, node: Node, definition: int = 0, above: str = "") -> Node:
+        key = node.given.removeprefix("#") if node.given.startswith("#") else ""
+        if usage := self._text.usages.get(int(key) if key.isdigit() else 0):
+            self._seen.add(int(key))
+            definition, names = usage.child, (usage.given, usage.product)
+        elif definition:
+            names = "", self._text.products[definition]
+        else:
+            names = node.given, node.product
+        given, product = map(authored, names)
+        if not usage and not given and not product:
+            product = above  # An assembly may have a solid of its own.
+        own = self._text.products.get(definition, "")
+        children = tuple(self._renamed(child, above=authored(own)) for child in node.children)
+        node = replace(node, given=given, product=product, children=children)
+        if not node.children and not node.surfaces and definition in self._documents:
+            return self._from_documents(node, self._documents[definition])
+        return node
+
+    def _from_documents(self, node: Node, names: list[str]) -> Node:
+        """Return an instance whose shape other files hold, as far as they lie beside this one."""
+        found = []
+        for name in names:
+            file = _beside(self._file, name)
+            if file is None or file.resolve() in self._above:
+                reason = f"its shape is in '{name}', which is not beside '{self._file.name}'"
+            elif file.suffix.lower() not in ASSEMBLY_SUFFIXES:
+                reason = f"its shape is in '{name}', which is not a STEP file"
+            else:
+                if file not in self._loaded:
+                    self._loaded[file] = load_assembly(file, self._tolerance, self._above)
+                found += [child.moved(node.X_AP) for child in self._loaded[file].children]
+                continue
+            found.append(Node(product=node.name, lacking=reason))
+        if len(found) == 1 and not found[0].children:
+            return replace(found[0], given=node.given, product=node.product or found[0].product)
+        return replace(node, children=tuple(found), lacking="")
+
+
+def _beside(file: Path, name: str) -> Path | None:
+    """Return the file that a name refers to, from the folder of another file; None if missing.
+
+    Names come from whatever system: with folders of its own, and in any case of letters.
+    """
+    plain = PureWindowsPath(name)  # It splits at both kinds of slashes.
+    for path in (file.parent / plain.as_posix(), file.parent / plain.name):
+        if path.is_file():
+            return path
+    same = [f for f in sorted(file.parent.iterdir()) if f.name.lower() == plain.name.lower()]
+    return same[0] if same else None
+
+
+def _authored(node: Node) -> Node:
+    """Return a tree whose names were given by its author."""
+    children = tuple(_authored(child) for child in node.children)
+    return replace(
+        node, given=authored(node.given), product=authored(node.product), children=children
+    )
+
+
+def _converted(data: bytes, deflection: float) -> bytes:
+    """Return a STEP file as binary glTF, at a deflection [mm]; empty if it is not a STEP file."""
     import cascadio  # Takes 0.1 s to load, which only STEP files need.
 
     with _without_output():
         return cascadio.load(
-            data, tol_linear=DEFLECTION, tol_angular=FACET_ANGLE, use_parallel=False
+            data, tol_linear=deflection, tol_angular=FACET_ANGLE, use_parallel=False
         )
 
 
@@ -108,9 +182,3 @@ def _without_output() -> Iterator[None]:
             for stream, copy in zip((1, 2), saved, strict=True):
                 os.dup2(copy, stream)
                 os.close(copy)
-
-
-def _natural(name: str) -> list[tuple[int, str]]:
-    """Return a key that sorts bolt_2 before bolt_10."""
-    pieces = re.split(r"(\d+)", name)
-    return [(int(piece), "") if piece.isdigit() else (-1, piece) for piece in pieces]

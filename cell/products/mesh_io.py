@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
 
-from cell.errors import BadPart, InputError, UnknownName
-from cell.products.repair import repaired
+from cell.errors import BadPart, UnknownName
+from cell.products.bodies import bodies_of
+from cell.products.surfaces import merged
 
 METERS_PER_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
 """Metres per CAD unit, by the name used on the command line."""
@@ -23,10 +25,10 @@ REPAIR = "repair"
 """Key in a mesh's metadata: what was done to close its surface, "" for nothing."""
 
 LARGEST_PART = 1.0
-"""[m] [D] the reach of the arms is 0.85 m: a longer part was read in wrong units."""
+"""[m] [D] the reach of the arms is 0.85 m: nothing here can hold a longer part."""
 
 SMALLEST_PART = 2e-4
-"""[m] [D] a tenth of the smallest bolt's diameter: a smaller part was read in wrong units."""
+"""[m] [D] a tenth of the smallest bolt's diameter: units of a smaller part are wrong, probably."""
 
 CREASE = 0.5
 """[rad] [R] edges sharper than this keep separate normals, so that they are rendered sharp."""
@@ -48,7 +50,7 @@ def load_mesh(path: Path, name: str, units: str | None = None) -> trimesh.Trimes
         units: Unit of the file; None for that of its format, or millimetres if it has none.
 
     Raises:
-        BadPart: If it is missing, unreadable, open, flat, or implausibly large or small.
+        BadPart: If it is missing, unreadable, open or flat.
     """
     if not path.is_file():
         raise BadPart(name, f"no mesh file '{path}'")
@@ -57,63 +59,51 @@ def load_mesh(path: Path, name: str, units: str | None = None) -> trimesh.Trimes
     default = "m" if path.suffix.lower() in UNIT_SUFFIXES else "mm"
     mesh = _read(path, name)
     mesh.apply_scale(meters_per_unit(units or default))
-    return check_mesh(mesh, name)
-
-
-def load_folder(folder: Path, units: str | None = None) -> dict[str, trimesh.Trimesh]:
-    """Read every mesh of a folder in the order of names; a part's name is the file's stem.
-
-    Files of other types are ignored.
-    """
-    files = [f for f in sorted(folder.iterdir()) if f.suffix.lower() in MESH_SUFFIXES]
-    if not files:
-        kinds = ", ".join(MESH_SUFFIXES)
-        raise InputError(f"Folder '{folder}' holds no mesh; supported: {kinds}.")
-    without = [file.name for file in files if file.suffix.lower() not in UNIT_SUFFIXES]
-    if units is None and without:
-        known = ", ".join(METERS_PER_UNIT)
-        raise InputError(f"'{without[0]}' states no unit of length: add --units, one of {known}.")
-    meshes: dict[str, trimesh.Trimesh] = {}
-    for file in files:
-        if file.stem in meshes:
-            raise BadPart(file.stem, f"two files of that name in '{folder}'")
-        meshes[file.stem] = load_mesh(file, file.stem, units)
-    return meshes
-
-
-def check_mesh(mesh: trimesh.Trimesh, name: str) -> trimesh.Trimesh:
-    """Return the mesh, facing outwards, or raise ``BadPart`` if it bounds no plausible solid.
-
-    A surface that a safe repair closes is repaired; ``metadata[REPAIR]`` says how.
-    """
-    size = float(np.max(mesh.extents)) if len(mesh.faces) else 0.0
-    if not np.isfinite(mesh.vertices).all() or size == 0.0:
-        raise BadPart(name, "the mesh has no faces, or corners that are not numbers")
-    mesh, repair = repaired(mesh)
-    if not (mesh.is_watertight and mesh.is_winding_consistent):
-        raise BadPart(name, "the mesh is not watertight" + _open_edges(mesh))
-    mesh.metadata[REPAIR] = repair
-    with np.errstate(invalid="ignore"):  # The centre of mass of nothing is not a number.
-        volume = float(mesh.volume)
-    if not abs(volume) > 1e-9 * size**3:
-        raise BadPart(name, "the mesh encloses no volume")
-    if size > LARGEST_PART:
-        raise BadPart(name, f"it is {size:.3g} m long, larger than the cell: wrong units, probably")
-    if size < SMALLEST_PART:
-        raise BadPart(name, f"it is only {size * 1e6:.3g} micrometres long: wrong units, probably")
-    if volume < 0.0:  # A closed surface that faces inwards is common in STL and unambiguous.
-        mesh.invert()
+    bodies = bodies_of(mesh)
+    if bodies.rejected:
+        raise BadPart(name, f"its mesh is no solid: {bodies.rejected[0].text()}")
+    mesh = bodies.as_one()[0]
+    mesh.metadata[REPAIR] = bodies.repair
     return mesh
 
 
-def _open_edges(mesh: trimesh.Trimesh) -> str:
-    """Return how many edges are not shared by exactly two faces, and where the first of them is."""
-    edges, count = np.unique(mesh.edges_sorted, axis=0, return_counts=True)
-    edges = edges[count != 2]
-    if not len(edges):
-        return ""
-    x, y, z = 1e3 * np.asarray(mesh.vertices)[edges[0]].mean(axis=0)
-    return f": {len(edges)} open edges, one of them at ({x:.3g}, {y:.3g}, {z:.3g}) mm"
+def load_surfaces(path: Path, name: str) -> list[tuple[str, trimesh.Trimesh]]:
+    """Read a file's surfaces, in its unit, each with the name of its object; "" if it has one only.
+
+    What is no surface, such as points, is a surface without faces.
+
+    Raises:
+        BadPart: It cannot be read.
+    """
+    by = _objects(path) if path.suffix.lower() == ".obj" else {}
+    try:
+        scene = trimesh.load_scene(path, process=False, **by)
+    except Exception as error:  # The readers of the formats share no exception type.
+        raise BadPart(name, f"'{path.name}' cannot be read ({error})") from error
+    shapes = {str(n): g for n, g in scene.geometry.items() if isinstance(g, trimesh.Trimesh)}
+    if not shapes:
+        return [("", trimesh.Trimesh())]
+    if len(shapes) == 1:
+        return [("", merged(shape)) for shape in shapes.values()]
+    listed = reversed(shapes.items()) if by else shapes.items()  # The reader goes backwards.
+    return [(label, merged(shape)) for label, shape in listed]
+
+
+def _objects(path: Path) -> dict[str, Any]:
+    """Return how to read a Wavefront file: by its objects if it has several, else by its groups."""
+    found: dict[bytes, set[bytes]] = {b"o": set(), b"g": set()}
+    current = {b"o": b"", b"g": b""}
+    for line in path.read_bytes().splitlines():
+        kind, _, rest = line.strip().partition(b" ")
+        if kind in current:
+            current[kind] = rest.strip()
+        elif kind == b"f":
+            for what, name in current.items():
+                found[what].add(name)
+    plain = {"group_material": False, "skip_materials": True}
+    if len(found[b"o"]) > 1:
+        return plain | {"split_objects": True}
+    return plain | {"split_groups": True} if len(found[b"g"]) > 1 else plain
 
 
 def _read(path: Path, name: str) -> trimesh.Trimesh:
@@ -126,13 +116,6 @@ def _read(path: Path, name: str) -> trimesh.Trimesh:
     if not isinstance(mesh, trimesh.Trimesh):
         raise BadPart(name, f"'{path.name}' holds no surface")
     return merged(mesh)
-
-
-def merged(mesh: trimesh.Trimesh) -> trimesh.Trimesh:
-    """Return a surface with coincident vertices merged, whatever their normals and colours."""
-    surface = trimesh.Trimesh(mesh.vertices, mesh.faces, process=False)
-    surface.merge_vertices(merge_norm=True, merge_tex=True)
-    return surface
 
 
 def obj_text(mesh: trimesh.Trimesh, *, normals: bool = False) -> str:

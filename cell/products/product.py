@@ -8,9 +8,10 @@ from dataclasses import dataclass, field
 import trimesh
 from pydrake.math import RigidTransform
 
-from cell.errors import InputError, UnknownName
+from cell.errors import BadPart, InputError, UnknownName
 from cell.products.declared import Declared
 from cell.products.joints import Fit, Joint, Screw
+from cell.products.mesh_io import LARGEST_PART
 
 
 @dataclass(frozen=True)
@@ -58,6 +59,19 @@ class Part:
 
 
 @dataclass(frozen=True)
+class LeftOut:
+    """What was in the input and is not planned.
+
+    Attributes:
+        name: Of a part, a sub-assembly or a file.
+        reason: Why, for example "not watertight: 4 open edges".
+    """
+
+    name: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class Product:
     """Parts in assembled poses, with groups, joints and assembly orders.
 
@@ -73,6 +87,7 @@ class Product:
         declared: What the user vouches for where the rule for rigid bodies would refuse it.
         tray: Name of the SDF model of the tray that presents the parts; None if there is none.
         remarks: What was assumed or repaired when it was read, one sentence each.
+        left_out: What was in the input and is not planned.
     """
 
     name: str = "nothing"
@@ -85,6 +100,16 @@ class Product:
     declared: Declared = field(default_factory=Declared)
     tray: str | None = None
     remarks: tuple[str, ...] = ()
+    left_out: tuple[LeftOut, ...] = ()
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What was left out, by reason, and the remarks: one sentence each."""
+        names: dict[str, list[str]] = {}
+        for thing in self.left_out:
+            names.setdefault(thing.reason, []).append(thing.name)
+        left_out = (f"left out: {', '.join(which)} ({why})" for why, which in names.items())
+        return (*left_out, *self.remarks)
 
     @property
     def fits(self) -> tuple[Fit, ...]:
@@ -116,9 +141,16 @@ class Product:
     def check_simulable(self) -> None:
         """Raise `InputError` for a product that can be planned but not simulated.
 
-        Every part needs a model with contact geometry, and a place in the tray to start from.
+        Every part needs a model with contact geometry, and a place in the tray to start from, and
+        the arms have to reach around it.
         """
         parts = self.parts.values()
+        for part in parts:
+            if (size := float(part.mesh.extents.max())) > LARGEST_PART:
+                reach = f"{LARGEST_PART:g} m at most"
+                raise BadPart(
+                    part.name, f"it is {size:.3g} m long: nothing here can hold it ({reach})"
+                )
         lacking = {
             "a contact model": [part.name for part in parts if part.model is None],
             "a place in the tray": [part.name for part in parts if part.X_TrayP is None],

@@ -186,7 +186,7 @@ def _pose(fields: Fields, key: str) -> RigidTransform:
     """Return a pose from millimetres and degrees; a missing half is zero."""
     pose = Fields(fields.raw(key), fields.at(key), POSE_KEYS)
     p = pose.vector("xyz_mm") * 1e-3 if "xyz_mm" in pose else np.zeros(3)
-    if np.max(np.abs(p)) > LARGEST_PART:
+    if key == "tray_pose" and np.max(np.abs(p)) > LARGEST_PART:
         raise InputError(f"{fields.at(key)}: {p} m is outside of the cell; wrong units?")
     rpy = np.deg2rad(pose.vector("rpy_deg")) if "rpy_deg" in pose else np.zeros(3)
     return RigidTransform(RollPitchYaw(rpy), p)

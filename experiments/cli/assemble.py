@@ -55,10 +55,11 @@ class Assemble:
             out = folders.enter_context(output_folder(self.common.out))
             if self.replay is not None:
                 folders.enter_context(output_folder(self.replay.absolute().parent))
-            from cell.products.loading import load_product
+            from cell.products.loading import load_product, require_product_file
             from experiments.assembly.assemble import run_job
             from experiments.assembly.job import Job
 
+            require_product_file(self.product)
             job = Job(
                 product=load_product(self.product),
                 order=split_order(self.order),

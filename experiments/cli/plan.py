@@ -22,19 +22,28 @@ class Plan:
     """Decide, for each assembly step, which part the jig holds and in which posture."""
 
     product: Annotated[Positional[str], arg(metavar="PRODUCT")]
-    """A name in models/products, a YAML, STEP or GLB file, or a folder of meshes, assembled."""
+    """A name in models/products, a YAML or CAD file, or a folder of CAD in assembled pose."""
 
     order: Annotated[str | None, arg(metavar="A,B,C")] = None
     """Assembly order: parts or groups, separated by commas. Default: the product's, or the best."""
 
     units: Annotated[str | None, arg(metavar="mm|cm|m|in")] = None
-    """Unit of a folder's meshes; needed unless all of them are .glb."""
+    """Unit of meshes that state none. Without such: overrides what STEP and GLB state."""
 
     density: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="[PART=]KG_M3")] = ()
     """Density of a part, or of all that are not named; a YAML file states masses. Repeatable."""
 
     group: bool = False
     """Make one item of the order of parts that are identical."""
+
+    depth: Annotated[int | None, arg(metavar="N")] = None
+    """Make one item of each sub-assembly at level N of the tree, from 1. Default: of each part."""
+
+    split: bool = False
+    """Make parts of the bodies or objects that one mesh or solid model holds."""
+
+    leave_out: Annotated[UseAppendAction[tuple[str, ...]], arg(metavar="NAME")] = ()
+    """Leave a part, sub-assembly or file out of the plan. Repeatable."""
 
     up: Annotated[str | None, arg(metavar="+x|-x|...|-z")] = None
     """Axis that points up on the jig; write --up=-z. Default: the product's, or +z."""
@@ -87,16 +96,24 @@ class Plan:
 
     def options(self) -> PlanOptions:
         """Return how the product is read and planned."""
+        from cell.products.read_options import ReadOptions
         from experiments.plan.options import PlanOptions
         from planning.feasibility.cache import user_cache
 
         if self.tolerance_mm is not None and not 0.0 < self.tolerance_mm < 10.0:
             raise BadUsage(f"--tolerance-mm must be between 0 and 10, not {self.tolerance_mm:g}.")
+        tolerance = None if self.tolerance_mm is None else 1e-3 * self.tolerance_mm
         return PlanOptions(
-            units=self.units,
-            densities=dict(map(split_density, self.density)),
-            group=self.group,
-            tolerance=None if self.tolerance_mm is None else 1e-3 * self.tolerance_mm,
+            read=ReadOptions(
+                units=self.units,
+                densities=dict(map(split_density, self.density)),
+                group=self.group,
+                split=self.split,
+                leave_out=self.leave_out,
+                depth=self.depth,
+                tolerance=tolerance,
+            ),
+            tolerance=tolerance,
             cache=None if self.no_cache else user_cache(),
             slanted=self.slanted,
             up=self.up,

@@ -64,9 +64,7 @@ def run_plan(
     Raises:
         InputError: The product or the order cannot be used; nothing is written.
     """
-    described = load_product(
-        product, options.units, densities=options.densities, group=options.group
-    )
+    described = load_product(product, options.read)
     if options.up:
         described = replace(described, up=options.up)
     declared = declared_from(

@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
+
+from cell.products.read_options import ReadOptions
 
 
 @dataclass(frozen=True)
@@ -12,9 +13,7 @@ class PlanOptions:
     """How a product is read and planned; the defaults are those of the command.
 
     Attributes:
-        units: Length unit of a folder's meshes.
-        densities: Densities of parts by name [kg/m3]; "" for all others.
-        group: Whether identical parts form groups.
+        read: How the product is read.
         tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
         cache: Folder of the matrix cache; None for no cache.
         slanted: Whether to search for slanted removal directions and local freedom.
@@ -22,9 +21,7 @@ class PlanOptions:
         accept, press, snap, flexible: What is declared, as ``declared_from`` reads it.
     """
 
-    units: str | None = None
-    densities: Mapping[str, float] = field(default_factory=dict)
-    group: bool = False
+    read: ReadOptions = ReadOptions()
     tolerance: float | None = None
     cache: Path | None = None
     slanted: bool = False

@@ -110,7 +110,7 @@ def evidence_of(
         tuple(sorted(matrices.overlaps.others, key=lambda one: -one.depth)),
         matrices.undercuts,
         tuple(sorted(found, key=lambda f: (not f.decides, f.margin))),
-        (*product.remarks, *_idle(product, matrices), *_doubts(product.items(), matrices)),
+        (*product.notes, *_idle(product, matrices), *_doubts(product.items(), matrices)),
         tuple(_item_freedoms(matrices, steps)) if slanted else (),
     )
 

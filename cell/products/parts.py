@@ -1,0 +1,145 @@
+"""From the tree of CAD files to parts: bodies told apart, split or joined, or left out."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+import trimesh
+
+from cell.products.bodies import Bodies, bodies_of
+from cell.products.product import LeftOut
+from cell.products.surfaces import joined, merged
+from cell.products.tree import Node, Surface, fit_for_orders
+
+NOT_WANTED = "by --leave-out"
+
+
+@dataclass
+class Parts:
+    """Parts by name, and what became of the rest.
+
+    Attributes:
+        meshes: Closed surfaces in the product frame A [m], by name.
+        left_out: What is not planned.
+        repairs: What was done to a part's surface, by name.
+        several: Number of bodies of parts that have more than one, by name.
+        united: Names of parts whose bodies overlapped and were united.
+    """
+
+    meshes: dict[str, trimesh.Trimesh] = field(default_factory=dict)
+    left_out: list[LeftOut] = field(default_factory=list)
+    repairs: dict[str, str] = field(default_factory=dict)
+    several: dict[str, int] = field(default_factory=dict)
+    united: list[str] = field(default_factory=list)
+
+
+def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Sequence[str]) -> Parts:
+    """Return the parts of a tree.
+
+    Args:
+        named: Its leaves, each with its name.
+        split: Whether each body is a part.
+        leave_out: Names of parts and of sub-assemblies, of which none is planned.
+    """
+    named = list(named)
+    names = {name for name, _ in named}
+    parts, known = Parts(), {}
+    for name, node in named:
+        if unwanted := _among(name, leave_out):
+            parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
+        elif not node.surfaces:
+            parts.left_out.append(LeftOut(name, node.lacking or "empty"))
+        else:
+            scale = np.linalg.det(node.surfaces[0].X_AP[:3, :3])
+            key = (*(id(surface.mesh) for surface in node.surfaces), abs(round(scale, 6)))
+            if key not in known:
+                known[key] = _Shape(node.surfaces)
+            shape, X_AP = known[key], node.surfaces[0].X_AP
+            if shape.bodies.rejected:
+                parts.left_out.append(_left_out(name, shape, X_AP))
+            if shape.one is None:
+                continue
+            if split and len(shape.objects) > 1:
+                labels = _body_names(name, [label for label, _ in shape.objects], names)
+                bodies = list(zip(labels, (solid for _, solid in shape.objects), strict=True))
+                names.update(labels)
+            else:
+                bodies = [(name, shape.one)]
+            if len(shape.objects) > len(bodies):
+                parts.several[name] = len(shape.objects)
+                parts.united += [name] if shape.is_united else []
+            for part, mesh in bodies:
+                if unwanted := _among(part, leave_out):
+                    parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
+                    continue
+                parts.meshes[part] = shape.placed(mesh, X_AP)
+                if shape.bodies.repair:
+                    parts.repairs[part] = shape.bodies.repair
+    return parts
+
+
+def _among(name: str, names: Iterable[str]) -> str:
+    """Return which of several names is this one, or that of a sub-assembly around it, or ""."""
+    return next((n for n in names if name == n or name.startswith(f"{n}/")), "")
+
+
+class _Shape:
+    """The bodies of the surfaces of one part, which all its instances share."""
+
+    def __init__(self, surfaces: Sequence[Surface]) -> None:
+        # A pose may scale, and what counts as a rounding error is known in metres only.
+        scale = abs(np.linalg.det(surfaces[0].X_AP[:3, :3])) ** (1.0 / 3.0)
+        self._scale = 1.0 if np.isclose(scale, 1.0, rtol=0.1) else scale
+        meshes = [self._in_meters(surface.mesh) for surface in surfaces]
+        bodies = [bodies_of(mesh) for mesh in meshes]
+        self.objects = [
+            (surface.name, solid)
+            for surface, found in zip(surfaces, bodies, strict=True)
+            for solid in found.solids
+        ]
+        self.bodies = bodies[0]
+        if len(bodies) > 1:
+            whole = bodies_of(merged(joined(meshes)))
+            if sum(len(found.rejected) for found in bodies) > len(whole.rejected):
+                # Objects that are faces of a body, by colour or material: they close together only.
+                self.objects = [("", solid) for solid in whole.solids]
+            solids = tuple(solid for _, solid in self.objects)
+            self.bodies = Bodies(solids, whole.rejected, whole.repair)
+        self.one, self.is_united = self.bodies.as_one() if self.objects else (None, False)
+
+    def _in_meters(self, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
+        return mesh if self._scale == 1.0 else mesh.copy().apply_scale(self._scale)
+
+    def pose(self, X_AP: np.ndarray) -> np.ndarray:
+        """Return the pose (4, 4) of the bodies for that of a surface."""
+        return X_AP @ np.diag([1.0 / self._scale] * 3 + [1.0])
+
+    def placed(self, mesh: trimesh.Trimesh, X_AP: np.ndarray) -> trimesh.Trimesh:
+        """Return a copy of one of the bodies, or of all, in the product frame."""
+        moved, X = mesh.copy(), self.pose(X_AP)
+        return moved if np.array_equal(X, np.eye(4)) else moved.apply_transform(X)
+
+
+def _body_names(name: str, labels: Sequence[str], taken: set[str]) -> list[str]:
+    """Return names for the bodies of a part: those of objects, else its own with numbers."""
+    folder = name[: name.rfind("/") + 1]
+    stems = [folder + fit_for_orders(label) if label else name for label in labels]
+    names: list[str] = []
+    for stem, label in zip(stems, labels, strict=True):
+        alone = bool(label) and stems.count(stem) == 1 and stem not in taken - {name}
+        number = 1
+        while not alone and (f"{stem}_{number}" in names or f"{stem}_{number}" in taken):
+            number += 1
+        names.append(stem if alone else f"{stem}_{number}")
+    return names
+
+
+def _left_out(name: str, shape: _Shape, X_AP: np.ndarray) -> LeftOut:
+    """Return what is no solid in a part, with the place of the first piece."""
+    pieces = shape.bodies.rejected
+    reason = pieces[0].text(shape.pose(X_AP))
+    if len(pieces) > 1:
+        reason += f", and {len(pieces) - 1} more pieces"
+    return LeftOut(name if shape.one is None else f"a surface in {name}", reason)
