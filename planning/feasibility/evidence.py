@@ -18,6 +18,7 @@ from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import opposite
 from planning.feasibility.freedom import Freedom, freedoms
+from planning.feasibility.helical_threads import unthreaded
 from planning.feasibility.matrices import AssemblyMatrices, reachable_directions
 
 StepIndices = Sequence[tuple[list[int], list[int]]]
@@ -115,7 +116,8 @@ def _item_freedoms(
 ) -> Iterator[ItemFreedom]:
     solids = dict(matrices.solids)
     for thread in matrices.threads:
-        solids[thread.nut] = solids[thread.nut].without(matrices.solids[thread.bolt])
+        bolt = matrices.solids[thread.bolt]
+        solids[thread.nut] = unthreaded(solids[thread.nut], bolt, thread)
     for step in steps:
         incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
         axes = [thread.axis for thread in matrices.threads if thread.bolt in step.incoming]
@@ -185,6 +187,7 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     for thread in data["threads"]:
         for name in ("diameter", "height", "length"):
             thread[f"{name}_m"] = thread.pop(name)
+        thread["pitch_m"] = thread.pop("pitch")
         thread["middle_m"] = list(thread.pop("p_AoT"))
         thread["axis"] = list(thread["axis"])
     for decision in data["fragile"]:
@@ -212,6 +215,9 @@ def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
             diameter=thread["diameter_m"],
             height=thread["height_m"],
             length=thread["length_m"],
+            pitch=thread["pitch_m"],
+            starts=thread["starts"],
+            both_ways=thread["both_ways"],
         )
         for thread in data["threads"]
     ]
@@ -240,11 +246,7 @@ def evidence_text(evidence: Evidence) -> str:
     source = "declared by the product" if evidence.declared else "by default"
     lines = [f"Tolerance {1e3 * evidence.tolerance:.3g} mm, {source}."]
     lines += [f"Note: {remark}" for remark in evidence.remarks]
-    lines += [
-        f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
-        f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
-        for thread in evidence.threads
-    ]
+    lines += [_thread_text(thread) for thread in evidence.threads]
     lines += [_fragile_text(decision) for decision in evidence.fragile if decision.decides]
     for motion in evidence.motions:
         along = f"{motion.item} along {_vector_text(motion.freedom.direction)}"
@@ -252,6 +254,16 @@ def evidence_text(evidence: Evidence) -> str:
         leaves = motion.freedom.leaves
         lines.append(f"Free: {along} to infinity." if leaves else f"Local: {along} by {travel}.")
     return "\n".join(lines)
+
+
+def _thread_text(thread: CadThread) -> str:
+    text = f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm"
+    if thread.pitch is not None:
+        hand = "left-hand" if thread.pitch < 0.0 else "right-hand"
+        starts = f" with {thread.starts} starts" if thread.starts > 1 else ""
+        text += f", pitch {1e3 * abs(thread.pitch):.3g} mm {hand}{starts}"
+    text += f", {1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}"
+    return text + ("." if thread.pitch is None else ", free along its axis by turning.")
 
 
 def _vector_text(vector: Sequence[float]) -> str:

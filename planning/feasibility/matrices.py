@@ -26,10 +26,13 @@ from planning.feasibility.contact import (
     gap_matrix,
     largest_tolerance,
 )
-from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.directions import DIRECTIONS, opposite, unit_vector
+from planning.feasibility.helical_threads import helical_threads, unthreaded
 from planning.feasibility.interference import Interference, interference
 from planning.feasibility.overlaps import without_overlaps
 from planning.feasibility.solids import Solid, solids_of
+
+SAME_WAY = 0.9998  # Cosine of 1 degree.
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,6 +90,13 @@ def matrices_of(
     held = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
     suspect = (gaps == 0.0) & np.all(held, axis=0)
     names = list(solids)
+    # Helical threads first: drawn without clearance they overlap, and that is no error.
+    turning = helical_threads(parts, leaving.free, tolerance)
+    for thread in turning:
+        bolt, nut = names.index(thread.bolt), names.index(thread.nut)
+        suspect[bolt, nut] = suspect[nut, bolt] = False
+        gaps[bolt, nut] = gaps[nut, bolt] = 0.0  # Flanks bear, whatever clearance is drawn.
+        leaving = _turned(leaving, parts, thread, tolerance)
     pairs = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
     fitted, threads = without_overlaps(product, solids, tolerance, pairs)
     for nut, name in enumerate(names):
@@ -95,7 +105,32 @@ def matrices_of(
             leaving = _updated(leaving, list(fitted.values()), nut, others, tolerance)
     margin = np.minimum(np.abs(gaps - tolerance), FRAGILE * tolerance)
     contact = contact_matrix(gaps, tolerance)
-    return AssemblyMatrices(solids, tolerance, contact, margin, leaving, threads)
+    return AssemblyMatrices(solids, tolerance, contact, margin, leaving, (*turning, *threads))
+
+
+def _turned(
+    leaving: Interference, parts: Sequence[Solid], thread: CadThread, tolerance: float
+) -> Interference:
+    """Recompute the entries of a bolt and its nut as the bolt leaves by turning."""
+    names = [part.name for part in parts]
+    bolt, nut = names.index(thread.bolt), names.index(thread.nut)
+    fitted = list(parts)
+    fitted[nut] = unthreaded(parts[nut], parts[bolt], thread)
+    turned = _updated(leaving, fitted, nut, np.array([bolt]), tolerance)
+    if thread.both_ways:
+        return turned
+    # The way on which it does not turn out stays as it was.
+    blockers = list(turned.blockers)
+    for j in DIRECTIONS:
+        against = float(unit_vector(j) @ np.array(thread.axis)) < -SAME_WAY
+        if not against or not turned.free[j][bolt, nut]:
+            continue
+        for direction, moving, staying in ((j, bolt, nut), (opposite(j), nut, bolt)):
+            turned.free[direction][moving, staying] = leaving.free[direction][moving, staying]
+            turned.margin[direction][moving, staying] = leaving.margin[direction][moving, staying]
+            own = names[moving], names[staying], direction
+            blockers += [b for b in leaving.blockers if (b.moving, b.staying, b.direction) == own]
+    return Interference(turned.free, tuple(blockers), turned.margin)
 
 
 def _updated(
