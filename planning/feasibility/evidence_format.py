@@ -40,6 +40,7 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
     for thread in data["threads"]:
         for name in ("diameter", "height", "length"):
             thread[f"{name}_m"] = thread.pop(name)
+        thread["pitch_m"] = thread.pop("pitch")
         thread["middle_m"] = list(thread.pop("p_AoT"))
         thread["axis"] = list(thread["axis"])
     for decision in data["fragile"]:
@@ -67,6 +68,9 @@ def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
             diameter=thread["diameter_m"],
             height=thread["height_m"],
             length=thread["length_m"],
+            pitch=thread["pitch_m"],
+            starts=thread["starts"],
+            both_ways=thread["both_ways"],
         )
         for thread in data["threads"]
     ]
@@ -114,11 +118,7 @@ def evidence_text(evidence: Evidence) -> str:
     if tolerances.small:
         lines.append(f"Less for small or thin parts: {_small_text(tolerances.small)}.")
     lines += [f"Note: {remark}" for remark in evidence.remarks]
-    lines += [
-        f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm, "
-        f"{1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}."
-        for thread in evidence.threads
-    ]
+    lines += [_thread_text(thread) for thread in evidence.threads]
     lines += [_explained_text(one) for one in evidence.overlaps if one.kind]
     lines += [
         f"Declared {one.kind}: {one.part} leaves along {one.direction} over an undercut of "
@@ -132,6 +132,16 @@ def evidence_text(evidence: Evidence) -> str:
         leaves = motion.freedom.leaves
         lines.append(f"Free: {along} to infinity." if leaves else f"Local: {along} by {travel}.")
     return "\n".join(lines)
+
+
+def _thread_text(thread: CadThread) -> str:
+    text = f"Fastener: {thread.bolt} in {thread.nut}, diameter {1e3 * thread.diameter:.3g} mm"
+    if thread.pitch is not None:
+        hand = "left-hand" if thread.pitch < 0.0 else "right-hand"
+        starts = f" with {thread.starts} starts" if thread.starts > 1 else ""
+        text += f", pitch {1e3 * abs(thread.pitch):.3g} mm {hand}{starts}"
+    text += f", {1e3 * thread.length:.3g} mm engaged, axis {_vector_text(thread.axis)}"
+    return text + ("." if thread.pitch is None else ", free along its axis by turning.")
 
 
 def _small_text(small: Mapping[str, float]) -> str:

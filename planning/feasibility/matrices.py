@@ -12,7 +12,7 @@ P_t displaced along j, flips every sign and contradicts the paper's table.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -20,12 +20,15 @@ from cell.products.product import Product
 from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.contact import contact_matrix
-from planning.feasibility.directions import DIRECTIONS, opposite
+from planning.feasibility.directions import DIRECTIONS, opposite, unit_vector
+from planning.feasibility.helical_threads import helical_threads, unthreaded
 from planning.feasibility.interference import Blocker, Interference, interference
 from planning.feasibility.overlaps import Overlap, Overlaps, find_overlaps, fitted_pair
 from planning.feasibility.solids import Solid, solids_of
-from planning.feasibility.tolerance import Tolerances, tolerances_of
+from planning.feasibility.tolerance import Tolerances, connecting, tolerances_of
 from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
+
+SAME_WAY = 0.9998  # Cosine of 1 degree.
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,8 +92,15 @@ def matrices_of(
     source = "declared by the product" if tolerance is None else "as given"
     parts, names = list(solids.values()), list(solids)
     tolerances, gaps = tolerances_of(parts, declared, source)
-    overlap, touch = tolerances.overlaps(names), tolerances.contacts(names)
+    overlap = tolerances.overlaps(names)
     leaving = interference(parts, overlap)
+    # Threads with real flanks first: drawn without clearance they overlap, and that is no error.
+    turning = helical_threads(parts, leaving.free, tolerances.overlap)
+    for thread in turning:
+        bolt, nut = names.index(thread.bolt), names.index(thread.nut)
+        gaps[bolt, nut] = gaps[nut, bolt] = 0.0  # Flanks bear, whatever clearance is drawn.
+    if declared is None:
+        tolerances, gaps = connecting(tolerances, parts, gaps)
     # Pairs that may overlap by more than the tolerance: their surfaces meet, and neither leaves the
     # other with a margin to spare. A layer of overlap between one and two tolerances thick is too
     # narrow to block across it, but only just.
@@ -98,14 +108,18 @@ def matrices_of(
     held = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
     suspect = (gaps == 0.0) & np.all(held, axis=0)
     suspects = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
+    known = {frozenset((thread.bolt, thread.nut)) for thread in turning}
+    suspects = [pair for pair in suspects if frozenset(pair) not in known]
     overlaps = find_overlaps(product, solids, tolerances, suspects)
+    overlaps = replace(overlaps, threads=(*turning, *overlaps.threads))
     for pair in fitted_pairs(solids, overlaps, tolerances):
-        leaving = _redecided(leaving, names, pair, tolerances)
+        leaving = _redecided(leaving, names, pair, tolerances, turning)
     undercuts = tuple(_undercuts(product, solids, leaving, tolerances.overlap))
     for one in undercuts:
         i, k = names.index(one.part), names.index(one.other)
         others = [k] if one.kind == "snap" else [n for n in range(len(names)) if n != i]
         leaving = _freed(leaving, names, one.direction, i, others, tolerances.overlap)
+    touch = tolerances.contacts(names)
     contact = contact_matrix(gaps, touch)
     margin = np.minimum(np.abs(gaps - touch), FRAGILE * touch)
     return AssemblyMatrices(solids, tolerances, contact, margin, leaving, overlaps, undercuts)
@@ -121,8 +135,10 @@ def fitted_pairs(
         overlaps: Of the product.
         tolerances: Of the product.
     """
-    threads = [(thread.bolt, thread.nut) for thread in overlaps.threads]
-    for bolt, nut in [*threads, *overlaps.screws]:
+    for thread in overlaps.threads:
+        bolt = solids[thread.bolt]
+        yield bolt, unthreaded(solids[thread.nut], bolt, thread)
+    for bolt, nut in overlaps.screws:
         yield solids[bolt], solids[nut].without(solids[bolt])
     for one in overlaps.others:
         if one.kind:
@@ -131,19 +147,42 @@ def fitted_pairs(
 
 
 def _redecided(
-    leaving: Interference, names: Sequence[str], pair: tuple[Solid, Solid], tolerances: Tolerances
+    leaving: Interference,
+    names: Sequence[str],
+    pair: tuple[Solid, Solid],
+    tolerances: Tolerances,
+    threads: Sequence[CadThread],
 ) -> Interference:
-    """Decide the entries of two parts anew, whose shapes have been fitted to each other."""
+    """Decide the entries of two parts anew, whose shapes have been fitted to each other.
+
+    Against the axis of a thread that turns out one way only, they stay as they were.
+    """
     free = {j: matrix.copy() for j, matrix in leaving.free.items()}
     margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
-    own = interference(pair, tolerances.overlap_of(*(solid.name for solid in pair)))
-    i, k = (names.index(solid.name) for solid in pair)
+    part, other = (solid.name for solid in pair)
+    own = interference(pair, tolerances.overlap_of(part, other))
+    one_way = [
+        np.array(thread.axis)
+        for thread in threads
+        if (thread.bolt, thread.nut) == (part, other) and not thread.both_ways
+    ]
+    kept = {j for j in DIRECTIONS for axis in one_way if unit_vector(j) @ axis < -SAME_WAY}
+    i, k = names.index(part), names.index(other)
+    decided = {(part, j) for j in DIRECTIONS if j not in kept}
+    decided |= {(other, opposite(j)) for _, j in decided}
     for j in DIRECTIONS:
         for values, new in ((free[j], own.free[j]), (margin[j], own.margin[j])):
-            values[i, k], values[k, i] = new[0, 1], new[1, 0]
-    both = {solid.name for solid in pair}
-    rest = [b for b in leaving.blockers if {b.moving, b.staying} != both]
-    return Interference(free, (*rest, *own.blockers), margin)
+            if (part, j) in decided:
+                values[i, k] = new[0, 1]
+            if (other, j) in decided:
+                values[k, i] = new[1, 0]
+
+    def is_decided(blocker: Blocker) -> bool:
+        both = {blocker.moving, blocker.staying} == {part, other}
+        return both and (blocker.moving, blocker.direction) in decided
+
+    rest = [blocker for blocker in leaving.blockers if not is_decided(blocker)]
+    return Interference(free, (*rest, *filter(is_decided, own.blockers)), margin)
 
 
 def _undercuts(

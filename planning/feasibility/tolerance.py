@@ -88,7 +88,22 @@ def tolerances_of(
     if given is not None:
         return Tolerances(given, given, source), gap_matrix(solids, (1.0 + FRAGILE) * given)
     gaps = gap_matrix(solids, (1.0 + FRAGILE) * USUAL)
-    tolerances = _derived(solids, gaps)
+    return _derived(solids, gaps), gaps
+
+
+def connecting(
+    tolerances: Tolerances, solids: Sequence[Solid], gaps: np.ndarray
+) -> tuple[Tolerances, np.ndarray]:
+    """Return tolerances at which the product hangs together, and gaps as far as they count.
+
+    The contact tolerance is raised to the longest edge of the tree that connects the parts, if it
+    is plausible as the clearance of a fit.
+
+    Args:
+        tolerances: As derived.
+        solids: The n parts.
+        gaps: (n, n) between them [m]; 0 where they are known to touch.
+    """
     pieces = _pieces(gaps <= tolerances.contacts([solid.name for solid in solids]))
     if not pieces.any():
         return tolerances, gaps
@@ -96,13 +111,6 @@ def tolerances_of(
     # Edges of length 0 would be none: contacts are set to the smallest length there is.
     edges = np.where(np.isfinite(wide), np.maximum(wide, 1e-12), 0.0)
     tree = minimum_spanning_tree(csr_array(edges)).toarray()
-    return _raised(tolerances, solids, gaps, tree) if tree.max() > 0.0 else (tolerances, gaps)
-
-
-def _raised(
-    tolerances: Tolerances, solids: Sequence[Solid], gaps: np.ndarray, tree: np.ndarray
-) -> tuple[Tolerances, np.ndarray]:
-    """Raise the contact tolerance to the longest edge of the tree that connects the parts."""
     longest = float(tree.max())
     if longest <= tolerances.contact:
         return tolerances, gaps
@@ -112,8 +120,8 @@ def _raised(
         f"{1e3 * longest:.3g} mm ({solids[i].name}, {solids[k].name})"
     )
     contact = PER_FIT * longest
-    reach = (1.0 + FRAGILE) * contact
-    return replace(tolerances, contact=contact, source=source), gap_matrix(solids, reach)
+    wide = np.minimum(gaps, gap_matrix(solids, (1.0 + FRAGILE) * contact))
+    return replace(tolerances, contact=contact, source=source), wide
 
 
 def _pieces(touching: np.ndarray) -> np.ndarray:
