@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-import time
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from cad_screws import hexagon, m8_bolt, m8_nut, plate_with, solid, thread
@@ -14,10 +11,12 @@ from tiny_products import box, product_of, rod
 from planning import plan
 from planning.feasibility.cache import load_matrices, save_matrices
 from planning.feasibility.directions import DIRECTIONS
-from planning.feasibility.evidence import evidence_from_dict, evidence_of, evidence_text
-from planning.feasibility.evidence import evidence_to_dict
-from planning.feasibility.helical_threads import find_helical_thread, unthreaded
-from planning.feasibility.interference import interference
+from planning.feasibility.evidence import (
+    evidence_from_dict,
+    evidence_text,
+    evidence_to_dict,
+)
+from planning.feasibility.helical_threads import find_helical_thread
 from planning.feasibility.matrices import matrices_of
 
 TOLERANCE = 5e-5

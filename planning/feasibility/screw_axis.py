@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from planning.feasibility.solids import Solid
 
@@ -148,7 +148,7 @@ def _near(a: _Surface, b: _Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray,
     """Return the points of both surfaces near the other, normals, areas, and which are a's."""
     reach = THREAD_CLEARANCE + max(a.spacing, b.spacing)
     near = [
-        cKDTree(other.spread).query(own.points, distance_upper_bound=reach)[0] <= reach
+        KDTree(other.spread).query(own.points, distance_upper_bound=reach)[0] <= reach
         for own, other in ((a, b), (b, a))
     ]
     points, normals, areas = (
