@@ -9,6 +9,7 @@ has the inner thread, and the bolt is free to leave along the tube's axis.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import manifold3d
 import numpy as np
@@ -20,6 +21,10 @@ LARGEST_PITCH = 0.25  # [S] ISO 261: of the diameter, M1 coarse; larger threads 
 SMALLEST_HEIGHT = 0.02  # [D] Of the diameter: 3/4 of the depth of a thread of pitch d / 20, fine.
 ROUND = 0.04  # [A] Of the radius: sagitta of 12 facets, the coarsest circle that CAD exports.
 PROBES = 8  # [A] Points about the axis at which a part is tested for material.
+SIDES = 5  # [A] Faces that are tried for walls, the largest that face different ways.
+STRAIGHT = 0.02  # [A] Sine of 1 degree, and 1 less the cosine of 11: walls across, ends along.
+WALL = 0.5  # Cosine: faces within 60 degrees of the axis are ends, as of chamfers.
+RARE = 0.05  # [A] Of the walls' area, by which single slivers do not set a radius.
 COARSEST_FACET = 0.7  # [rad] [A] Nine facets a turn: the largest step between corners of a tube.
 
 
@@ -94,19 +99,22 @@ def _tube(
     doubled = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     areas = np.linalg.norm(doubled, axis=1)
     normals = doubled / np.maximum(areas, 1e-30)[:, None]
-    # The walls' normals lie across the axis; those along it, of the narrow ends, add little.
-    _, vectors = np.linalg.eigh(np.einsum("i,ij,ik->jk", areas, normals, normals))
-    axis = vectors[:, 0]
-    across = vectors[:, 1:]
-    flat = vertices @ across
-    # Two concentric circles: the first fit is between them, the second on the outer one.
-    rough = _fitted_centre(flat)
-    radii = np.hypot(*(flat - rough).T)
-    centre = _fitted_centre(flat[radii >= (radii.min() + radii.max()) / 2.0])
-    radii = np.hypot(*(flat - centre).T)
-    inner, outer = float(radii.min()), float(radii.max())
-    along = vertices @ axis
-    length = float(np.ptp(along))
+    axis = _axis_of(normals, areas)
+    if axis is None:
+        return None
+    across = np.linalg.svd(axis[None])[2][1:].T
+    length = float(np.ptp(vertices @ axis))
+    # Films of rounding, where the bolt's end or head lies on the nut, belong to neither wall.
+    walls = np.abs(normals @ axis) < WALL
+    triangles, areas, facing = triangles[walls], areas[walls], (normals @ across)[walls]
+    if not len(triangles):
+        return None
+    seen = triangles @ across
+    centre = _centre_of_walls(seen, facing, areas)
+    outward = (facing * (seen.mean(axis=1) - centre)).sum(axis=1) > 0.0
+    radii = np.linalg.norm(seen - centre, axis=2)
+    inner = _usual(radii[~outward], areas[~outward], RARE)
+    outer = _usual(radii[outward], areas[outward], 1.0 - RARE)
     limit = THREAD_HEIGHT_PER_PITCH * LARGEST_PITCH * 2.0 * outer + ROUND * outer + tolerance
     height = outer - inner
     if inner < 0.5 * outer or not SMALLEST_HEIGHT * 2.0 * outer <= height <= limit:
@@ -114,18 +122,63 @@ def _tube(
     if length < 2.0 * height:
         return None
     # A tube surrounds its axis without a gap: no large step between the angles of its corners.
-    seen = triangles @ across - centre
-    angle = np.sort(np.arctan2(seen[..., 1], seen[..., 0]).ravel())
+    angle = np.sort(np.arctan2(*(seen - centre).reshape(-1, 2).T[::-1]))
     if np.diff(angle, append=angle[0] + 2.0 * np.pi).max() >= COARSEST_FACET:
         return None
+    along = vertices @ axis
     middle = across @ centre + axis * float(along.min() + along.max()) / 2.0
     return axis, middle, inner, outer, length
 
 
-def _fitted_centre(points: np.ndarray) -> np.ndarray:
-    """Return the centre of the least-squares circle: |p|^2 = 2 c.p + constant."""
-    system = np.c_[2.0 * points, np.ones(len(points))]
-    return np.linalg.lstsq(system, (points**2).sum(axis=1), rcond=None)[0][:2]
+def _axis_of(normals: np.ndarray, areas: np.ndarray) -> np.ndarray | None:
+    """Return the unit vector that most of a tube's faces lie along or across, None for no tube.
+
+    Any two walls determine it. They are taken from the largest faces, of which those of a film at
+    an end all face the same way.
+    """
+    largest = np.argsort(-areas)
+    chosen: list[np.ndarray] = []
+    while len(chosen) < SIDES and len(largest):
+        chosen.append(normals[largest[0]])
+        largest = largest[np.abs(normals[largest] @ chosen[-1]) < 1.0 - STRAIGHT]
+    tried = np.array([np.cross(a, b) for a, b in combinations(chosen, 2)]).reshape(-1, 3)
+    if not len(tried):
+        return None
+    tried /= np.linalg.norm(tried, axis=1)[:, None]
+    cosine = np.abs(normals @ tried.T)
+    fitting = areas @ ((cosine < STRAIGHT) | (cosine > 1.0 - STRAIGHT))
+    return tried[int(fitting.argmax())]
+
+
+def _centre_of_walls(seen: np.ndarray, normals: np.ndarray, areas: np.ndarray) -> np.ndarray:
+    """Return the point (2,) at which the lines across all walls, through their middles, meet.
+
+    Least squares weighted by area, so that it does not matter into which triangles a wall is cut.
+
+    Args:
+        seen: (m, 3, 2) corners of the triangles across the axis [m].
+        normals: (m, 2) their normals, across the axis.
+        areas: (m,) their weights.
+    """
+    along = np.c_[-normals[:, 1], normals[:, 0]]
+    weight = np.sqrt(areas)[:, None]
+    offset = (along * seen.mean(axis=1)).sum(axis=1)
+    return np.linalg.lstsq(weight * along, weight[:, 0] * offset, rcond=None)[0]
+
+
+def _usual(radii: np.ndarray, areas: np.ndarray, share: float) -> float:
+    """Return the radius below which a share of the walls lies; 0 if there are none.
+
+    Args:
+        radii: (m, 3) of the corners of the walls' triangles [m].
+        areas: (m,) of the triangles.
+        share: Of the area, from 0 to 1.
+    """
+    if not len(radii):
+        return 0.0
+    order = np.argsort(radii, axis=None)
+    below = np.cumsum(np.repeat(areas, 3)[order])
+    return float(radii.ravel()[order[np.searchsorted(below, share * below[-1])]])
 
 
 def _fills(solid: Solid, middle: np.ndarray, axis: np.ndarray, radius: float) -> bool:
