@@ -116,6 +116,31 @@ def test_a_half_sunk_key_is_no_thread():
     assert overlapping({"plate": plate, "key": key}) == {("plate", "key")}
 
 
+FLUSH = {
+    "end on the floor of the hole": box((30, 30, 20), (-15, -15, -20)) - rod(3.3, -8, 5, 32),
+    "head on the nut": box((20, 20, 8), (-10, -10, -8)) - rod(3.3, -9, 5, 32),
+    "both": box((20, 20, 20), (-10, -10, -20)) - rod(3.3, -8, 5, 32),
+}
+
+
+@pytest.mark.parametrize("rounding", [0.0, 1e-9, 1e-8, 1e-7, 1e-6])
+@pytest.mark.parametrize("where", FLUSH)
+def test_faces_of_the_bolt_that_lie_on_the_nut_do_not_hide_its_thread(where, rounding):
+    """Rounding makes a film of common volume there, which may be wider than the thread."""
+    head = rod(7, 0, 4, 24) if where != "end on the floor of the hole" else rod(4, 0, 4, 32)
+    shapes = {"nut": FLUSH[where], "bolt": rod(4, -8 if where != "head on the nut" else -12, 1, 32)}
+    shapes["bolt"] += head
+    for seed in range(4):
+        rng = np.random.default_rng(seed)
+        nut, bolt = (solid(shape, name) for name, shape in shapes.items())
+        for each in (nut, bolt):
+            each.vertices[:] += rng.uniform(-rounding, rounding, each.vertices.shape)
+        found = find_thread(nut, bolt, TOLERANCE)
+        assert found is not None and (found.bolt, found.nut) == ("bolt", "nut")
+        assert found.height == pytest.approx(0.35e-3, abs=2e-5)
+        np.testing.assert_allclose(np.abs(found.axis), [0, 0, 1], atol=1e-3)
+
+
 @pytest.mark.parametrize("sink", [0.055, 0.07, 0.095, 0.11])
 @pytest.mark.parametrize("tilt", [0.0, 30.0, 45.0])
 def test_a_layer_thicker_than_the_tolerance_is_an_error(sink, tilt):

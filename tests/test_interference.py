@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from manifold3d import Manifold
+from manifold3d import CrossSection, Manifold
 from oracle import is_blocked
 from tiny_products import (
     box,
@@ -106,6 +106,38 @@ def test_faces_sunk_into_each_other_within_the_tolerance_do_not_block(depth, way
     """A cube 0.04 mm deep in a plate is a rounding of CAD; 0.2 mm is an obstacle."""
     plate, cube = box((60, 60, 10), (-30, -30, 0)), box((10, 10, 10), (-5, -5, 10 - depth))
     assert leaves(product_of({"plate": plate, "cube": cube}), "cube", "plate") == ways
+
+
+SEATS = {
+    "ball": lambda facets: Manifold.sphere(8, facets).translate([0, 0, 4]),
+    "plug": lambda facets: Manifold.cylinder(13, 3, 9.5, facets).translate([0, 0, -10]),
+    "taper of 1 degree": lambda facets: Manifold.cylinder(40, 8, 8.7, facets).translate(
+        [0, 0, -20]
+    ),
+    "o-ring": lambda facets: Manifold.revolve(
+        CrossSection.circle(2, facets).translate([9, 0]), facets
+    ),
+}
+
+
+@pytest.mark.parametrize("facets", [(64, 50), (48, 100), (64, 64)])
+@pytest.mark.parametrize("seat", SEATS)
+def test_what_lies_in_a_slanted_seat_leaves_it_however_both_are_tessellated(seat, facets):
+    """Facets cross by their sagitta across the seat, which is many times that along the axis."""
+    part, hollow = (SEATS[seat](count) for count in facets)
+    product = product_of({"block": box((40, 40, 30), (-20, -20, -30)) - hollow, "part": part})
+    assert leaves(product, "part", "block") == ["+z"]
+
+
+@pytest.mark.parametrize("slope", [0.0, 30.0, 60.0, 80.0])
+def test_layers_of_overlap_count_across_the_faces(slope):
+    """Two slabs on each other, at any slope, sunk into each other by a layer across them."""
+    ways = []
+    for layer in (0.04, 0.12):
+        lower, upper = box((30, 30, 10), (-15, -15, -10)), box((30, 30, 10), (-15, -15, -layer))
+        shapes = {n: s.rotate([0, slope, 0]) for n, s in (("lower", lower), ("upper", upper))}
+        ways.append("+z" in leaves(product_of(shapes), "upper", "lower"))
+    assert ways == [True, False]
 
 
 def test_a_part_far_away_blocks_too():

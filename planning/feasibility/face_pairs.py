@@ -22,6 +22,8 @@ DENSE = 400_000  # Up to this many pairs, comparing all with all is faster than 
 ON_EDGE = 1e-12  # [m] A point on the edge of a face's box counts as inside.
 OUTERMOST = 96  # Faces of each part about a point: more than lie within a few tolerances of it.
 FIRST_ROW, FIRST_COLUMN = 1, 2
+# Cosine of 20 degrees. [D] Between normals of facets on each other, of 12 and of 36 to a turn.
+OPPOSED = 0.94
 CELLS_PER_FACE = 6.0  # A face lies in a few cells of the grid; larger cells hold more faces each.
 
 
@@ -61,14 +63,36 @@ def blocked_regions(several: Sequence[FacePairs], height: float) -> Polygons:
     """Return the regions in which each up-face is above its down-face by more than a height [m].
 
     One polygon per pair, in order, possibly empty. Several pairs of parts go into one array, since
-    clipping few polygons takes as long as clipping many.
+    clipping few polygons takes as long as clipping many. Of two faces that lie on each other, the
+    height counts across them (see ``_least_excess``).
     """
     down = np.concatenate([pairs.down.corners[pairs.d] for pairs in several])
     up = np.concatenate([pairs.up.corners[pairs.u] for pairs in several])
-    excess = np.concatenate([p.up.planes[p.u] - p.down.planes[p.d] for p in several])
+    below = np.concatenate([pairs.down.planes[pairs.d] for pairs in several])
+    above = np.concatenate([pairs.up.planes[pairs.u] for pairs in several])
+    excess = above - below
     regions = triangle_overlaps(down, up)
-    slope, offset = excess[:, None, :2], excess[:, 2] - height
+    slope, offset = excess[:, None, :2], excess[:, 2] - _least_excess(below, above, height)
     return regions.clipped((regions.corners * slope).sum(axis=2) + offset[:, None])
+
+
+def _least_excess(below: np.ndarray, above: np.ndarray, height: float) -> np.ndarray:
+    """Return how far along the axis an up-face must rise above a down-face to count, (p,) [m].
+
+    Facets of a ball and of its seat, or of a plug and its tapered hole, cross by their sagitta
+    across the surface: along the axis that is the more, the steeper they are. So for faces that lie
+    on each other the height is one across the steeper face.
+
+    Args:
+        below: (p, 3) planes of the down-faces as in ``Faces``.
+        above: (p, 3) planes of the up-faces.
+        height: Overlap that does not count [m].
+    """
+    a, b = below[:, :2], above[:, :2]
+    steep_a, steep_b = (1.0 + np.einsum("ij,ij->i", s, s) for s in (a, b))
+    alike = 1.0 + np.einsum("ij,ij->i", a, b)
+    opposed = alike > OPPOSED * np.sqrt(steep_a * steep_b)
+    return height * np.where(opposed, np.sqrt(np.maximum(steep_a, steep_b)), 1.0)
 
 
 def heights_over(faces: Faces, points: np.ndarray) -> list[np.ndarray]:
