@@ -110,7 +110,9 @@ def find_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | None:
         return None
     bolt, nut = parts
     beyond = height + 1e3 * tolerance
-    through = all(ring.fills(bolt, z, ring.outer - height / 2.0) for z in (low - beyond, high + beyond))
+    through = all(
+        ring.fills(bolt, z, ring.outer - height / 2.0) for z in (low - beyond, high + beyond)
+    )
     if length < (height if through else max(SLENDER * height, ENGAGED * 2.0 * ring.outer)):
         return None
     # The bolt leaves on the side on which it protrudes further from the nut.
@@ -222,17 +224,22 @@ def _ring(a: Solid, b: Solid, tolerance: float) -> _Ring | None:
     step = (high - low) / HEIGHTS
     heights = low + step * (np.arange(HEIGHTS) + 0.5)
     walls = filled_widths([around], 0.0, outer, heights)[0]
-    # Whatever else they share, outside or beyond the tube, is an overlap of another kind.
-    width, length = outer * (1.0 + ROUND) + 1e3 * tolerance, (high - low) / 2.0
-    allowed = CrossSection.square([width, high - low + 2.0 * length]).translate([0.0, low - length])
-    more = CrossSection.batch_boolean(sections, OpType.Add) - allowed
+    # Whatever else they share, outside or beyond the tube, is an overlap of another kind, except
+    # for films between the facets of the two circles.
+    length, film = (high - low) / 2.0, ROUND * outer
+    tube = CrossSection.square([outer + film + 1e3 * tolerance, 4.0 * length])
+    tube = tube.translate([0.0, low - length])
+    more = CrossSection.batch_boolean(sections, OpType.Add)
+    _, bottom, _, top = more.bounds()
+    films = CrossSection.square([2.0 * film, top - bottom]).translate([outer - film, bottom])
+    more = more - tube - films
     if not more.offset(-1e3 * tolerance / 2.0, JoinType.Miter, 2.0).is_empty():
         return None
     largest = THREAD_HEIGHT_PER_PITCH * LARGEST_PITCH * 2.0 * outer + ROUND * outer
     depths = filled_widths(sections, 0.0, 2.0 * outer, heights).mean(axis=0)
     corners = 1e3 * (np.array(common.to_mesh64().vert_properties)[:, :3] - centre)
     radii = np.linalg.norm(np.cross(corners, axis), axis=1)
-    outer = float(radii[radii < width].max(initial=0.0))
+    outer = float(radii[radii < outer + film + 1e3 * tolerance].max(initial=0.0))
     if not outer > 0.0:
         return None
     return _Ring(axis, centre, outer, heights, walls, depths, largest + 1e3 * tolerance)

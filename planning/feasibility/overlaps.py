@@ -59,9 +59,10 @@ def without_overlaps(
     threads: list[CadThread] = []
     for a, b in combinations(solids, 2) if suspects is None else suspects:
         depth = overlap_depth(solids[a], solids[b])
-        if depth <= tolerance:
+        # A pair that nothing separates may be held by a thread thinner on average than it is deep.
+        thread = find_thread(solids[a], solids[b], tolerance) if depth > 0.0 else None
+        if depth <= tolerance and thread is None:
             continue
-        thread = find_thread(solids[a], solids[b], tolerance)
         recognised = (thread.bolt, thread.nut) if thread else None
         bolt_and_nut = _declared(product, a, b, depth, tolerance) or recognised
         if bolt_and_nut is None:

@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 from planning.feasibility.solids import Solid
 
@@ -97,7 +97,7 @@ def fitted_axis(
     weights = areas
     axis, velocity, residuals = np.zeros(3), np.zeros(3), areas
     for _ in range(ROUNDS):
-        form = np.einsum("i,ij,ik->jk", weights, rows, rows)
+        form = (rows * weights[:, None]).T @ rows
         solved = np.linalg.lstsq(form[:3, :3], form[:3, 3:], rcond=1e-9)[0]
         axis = np.linalg.eigh(form[3:, 3:] - form[3:, :3] @ solved)[1][:, 0]
         velocity = -solved @ axis
@@ -144,13 +144,11 @@ def _sampled(solid: Solid, low: np.ndarray, high: np.ndarray) -> _Surface | None
     return _Surface(*integration_points(corners), spread, spacing)
 
 
-def _near(
-    a: _Surface, b: _Surface
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+def _near(a: _Surface, b: _Surface) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Return the points of both surfaces near the other, normals, areas, and which are a's."""
     reach = THREAD_CLEARANCE + max(a.spacing, b.spacing)
     near = [
-        cKDTree(other.spread).query(own.points, distance_upper_bound=reach)[0] <= reach
+        KDTree(other.spread).query(own.points, distance_upper_bound=reach)[0] <= reach
         for own, other in ((a, b), (b, a))
     ]
     points, normals, areas = (
