@@ -4,16 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cad_screws import solid
 from manifold3d import Manifold
 from pydrake.math import RigidTransform
 from tiny_products import bolted, box, product_of, rod, to_trimesh
 
 from cell.products.product import Part, Product
 from planning import plan
-from planning.feasibility.cad_threads import find_thread
+from planning.feasibility.cad_threads import find_press_fit, find_thread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.matrices import matrices_of
-from planning.feasibility.solids import Solid
 
 TOLERANCE = 5e-5
 
@@ -27,11 +27,6 @@ def bolted_shapes(thread: float) -> dict[str, Manifold]:
     base = box((30, 30, 20), (-15, -15, -20)) - rod(thread, -10, 5, 32)
     lid = box((30, 30, 5), (-15, -15, 0)) - rod(3.4, -5, 10, 32)
     return {"base": base, "lid": lid, "bolt": rod(3, -5, 6, 64) + rod(5.5, 5, 8, 32)}
-
-
-def solid(shape: Manifold, name: str) -> Solid:
-    mesh = to_trimesh(shape)
-    return Solid(name, np.array(mesh.vertices), np.array(mesh.faces), 1.0, np.zeros(3))
 
 
 def overlapping(shapes: dict[str, Manifold]) -> set[tuple[str, str]]:
@@ -194,3 +189,103 @@ def test_bolts_drawn_on_their_holes_leave(facets, diameter, places, overlap):
     assert len(matrices.threads) == (len(places) if overlap else 0)
     for bolt in range(1, 1 + len(places)):
         assert [j for j in DIRECTIONS if matrices.interference.free[j][bolt, 0]] == ["+z"]
+
+
+TOLERANCES = (1e-6, 1e-5, 2e-5, 4.6e-5, 5e-5, 7e-5, 1e-4, 2e-4, 3e-4)
+
+BLOCK = box((30, 30, 20), (-15, -15, -20))
+DRILLED = (
+    BLOCK
+    - rod(5, -12, 1, 32)
+    - Manifold.cylinder(1.5, 0, 2.5, 32).translate([0, 0, -13.5])  # The cone that a drill leaves.
+)
+
+
+def m6(tip: float) -> Manifold:
+    return rod(6, tip, 6, 48) + rod(10, 6, 10, 6)
+
+
+def locknut(lip: float, length: float, bore: float = 5.0) -> Manifold:
+    """Nut from z = 8 to 12, with a collar of the lip's bore at its end.
+
+    The nut's facets are turned by half of one against the bolt's: films lie between them.
+    """
+    nut = rod(10, 8, 12, 6) - rod(bore, 7, 13).rotate([0, 0, 180 / 64])
+    return nut + (rod(10, 12, 12 + length, 6) - rod(lip, 11, 14, 32))
+
+
+@pytest.mark.parametrize(
+    ("nut", "bolt", "height", "length"),
+    [
+        (locknut(4.25, 0.4), rod(5, -4, 20), 0.375, 0.4),
+        (locknut(4.5, 0.4), rod(5, -4, 20), 0.25, 0.4),
+        (locknut(4.0, 0.5, bore=4.2), rod(5, -4, 20), 0.4, 4.5),
+        (DRILLED, m6(-11), 0.5, 11),
+        (DRILLED, m6(-12.5), 0.5, 12.5),
+        (BLOCK - rod(5, -21, 1, 32) - Manifold.cylinder(2, 2.5, 4.5, 32).translate([0, 0, -1.99]),
+         m6(-11), 0.5, 9.4),
+        (BLOCK - rod(5, -21, 1, 32),
+         m6(-13) + Manifold.cylinder(1, 2.2, 3, 48).translate([0, 0, -14]), 0.5, 13.5),
+    ],
+    ids=["lip", "flat lip", "tapped with a lip", "blind", "tip in the cone", "countersunk",
+         "chamfered"],
+)  # fmt: skip
+@pytest.mark.parametrize("turn", [(0, 0, 0), (30, 20, 10)], ids=["upright", "slanted"])
+def test_a_thread_is_one_at_every_tolerance(nut, bolt, height, length, turn):
+    """Films between facets, a lip, a cone: what goes all around the axis decides."""
+    parts = [solid(shape.rotate(list(turn)), name) for shape, name in ((nut, "n"), (bolt, "b"))]
+    for tolerance in TOLERANCES:
+        found = find_thread(parts[0], parts[1], tolerance)
+        assert found is not None and (found.bolt, found.nut) == ("b", "n")
+        assert found.height == pytest.approx(1e-3 * height, rel=0.05)
+        assert found.length == pytest.approx(1e-3 * length, rel=0.02)
+        assert found.pitch is None
+        assert find_press_fit(parts[0], parts[1], tolerance) is None
+
+
+@pytest.mark.parametrize(
+    ("a", "b"),
+    [
+        (rod(40, -0.3, 8) - rod(10, -2, 10), rod(10, -5, 30) + rod(11, -20, 0)),
+        (rod(40, -0.3, 8) - rod(10, -2, 10), rod(10, -5, 30) + rod(12.6, -20, 0)),
+        (rod(40, -0.3, 8) - rod(10, -2, 10), rod(10, -5, 30) + rod(16, -20, 0)),
+        (rod(40, -0.3, 8) - rod(10.2, -2, 10), rod(10, -5, 30) + rod(16, -20, 0)),
+        (box((20, 20, 5), (-10, -10, 0)), rod(8, -9.7, 0.3)),
+        (DRILLED, m6(-17)),
+    ],
+    ids=["low shoulder", "shoulder", "high shoulder", "loose on its shaft", "disc in a plate",
+         "tip beyond the hole"],
+)  # fmt: skip
+def test_a_part_driven_into_a_shoulder_is_no_thread(a, b):
+    parts = solid(a, "a"), solid(b, "b")
+    for tolerance in TOLERANCES:
+        assert find_thread(*parts, tolerance) is None
+        assert find_press_fit(*parts, tolerance) is None
+
+
+@pytest.mark.parametrize(
+    ("diameter", "interference"), [(6, 0.04), (6, 0.1), (10, 0.04), (10, 0.1), (3, 0.05)]
+)
+def test_a_press_fit_is_told_from_a_thread(diameter, interference):
+    """Far shallower than the finest thread of its diameter; it is reported with its depth."""
+    block = BLOCK - rod(diameter, -10, 1, 48)
+    pin = rod(diameter + 2 * interference, -10, 5)
+    parts = solid(block, "block"), solid(pin, "pin")
+    for tolerance in TOLERANCES:
+        assert find_thread(*parts, tolerance) is None
+        found = find_press_fit(*parts, tolerance)
+        if 1e3 * tolerance < interference:
+            assert found is not None and (found.pin, found.hole) == ("pin", "block")
+            assert found.interference == pytest.approx(1e-3 * interference, abs=6e-6)
+            assert found.length == pytest.approx(10e-3, rel=0.01)
+            assert abs(found.axis[2]) == pytest.approx(1.0, abs=1e-9)
+        elif 1e3 * tolerance > 1.2 * interference:
+            assert found is None
+
+
+def test_a_sunk_head_is_an_overlap_until_it_is_within_the_tolerance():
+    """What the two share beyond the thread counts; once it does not, it never does again."""
+    bolt = rod(6, -11, -0.03, 48) + rod(10, -0.03, 4, 6)
+    parts = solid(DRILLED, "nut"), solid(bolt, "bolt")
+    found = [find_thread(*parts, tolerance) is not None for tolerance in TOLERANCES]
+    assert found == sorted(found) and not found[0] and found[-1]

@@ -86,7 +86,8 @@ def filled_widths(
 
     Args:
         sections: Of a part.
-        inner, outer: Radii of the band [mm].
+        inner: Radius at which the band begins [mm].
+        outer: Radius at which it ends [mm].
         heights: (n,) ascending [mm].
     """
     widths = np.zeros((len(sections), len(heights)))

@@ -33,6 +33,7 @@ ROUND = 0.04  # [A] Of the radius: sagitta of 12 facets, the coarsest circle tha
 PROBES = 8  # [A] Points about the axis at which a part is tested for material.
 HEIGHTS = 400  # At which the wall of a tube is measured.
 WALL = 0.3  # Sine of 17 degrees to the axis: walls are steeper, tips and countersinks are not.
+SLIVER = 1e-3  # [A] Of the largest face: smaller ones are edges of films.
 SAME = 1e-3  # [mm] Film that no section can tell from none.
 
 
@@ -224,17 +225,22 @@ def _ring(a: Solid, b: Solid, tolerance: float) -> _Ring | None:
     step = (high - low) / HEIGHTS
     heights = low + step * (np.arange(HEIGHTS) + 0.5)
     walls = filled_widths([around], 0.0, outer, heights)[0]
-    # Whatever else they share, outside or beyond the tube, is an overlap of another kind.
-    width, length = outer * (1.0 + ROUND) + 1e3 * tolerance, (high - low) / 2.0
-    allowed = CrossSection.square([width, high - low + 2.0 * length]).translate([0.0, low - length])
-    more = CrossSection.batch_boolean(sections, OpType.Add) - allowed
+    # Whatever else they share, outside or beyond the tube, is an overlap of another kind, except
+    # for films between the facets of the two circles.
+    length, film = (high - low) / 2.0, ROUND * outer
+    tube = CrossSection.square([outer + film + 1e3 * tolerance, 4.0 * length])
+    tube = tube.translate([0.0, low - length])
+    more = CrossSection.batch_boolean(sections, OpType.Add)
+    _, bottom, _, top = more.bounds()
+    films = CrossSection.square([2.0 * film, top - bottom]).translate([outer - film, bottom])
+    more = more - tube - films
     if not more.offset(-1e3 * tolerance / 2.0, JoinType.Miter, 2.0).is_empty():
         return None
     largest = THREAD_HEIGHT_PER_PITCH * LARGEST_PITCH * 2.0 * outer + ROUND * outer
     depths = filled_widths(sections, 0.0, 2.0 * outer, heights).mean(axis=0)
-    corners = 1e3 * (np.array(common.to_mesh64().vert_properties)[:, :3] - centre)
+    corners = 1e3 * (_wall_corners(_triangles(common), axis) - centre)
     radii = np.linalg.norm(np.cross(corners, axis), axis=1)
-    outer = float(radii[radii < width].max(initial=0.0))
+    outer = float(radii[radii < outer + film + 1e3 * tolerance].max(initial=0.0))
     if not outer > 0.0:
         return None
     return _Ring(axis, centre, outer, heights, walls, depths, largest + 1e3 * tolerance)
@@ -242,9 +248,8 @@ def _ring(a: Solid, b: Solid, tolerance: float) -> _Ring | None:
 
 def _axis_of(common: manifold3d.Manifold) -> tuple[np.ndarray, np.ndarray]:
     """Return axis (3,) about which a volume is round, and a point on it [m]."""
-    mesh = common.to_mesh64()
-    vertices = np.array(mesh.vert_properties)[:, :3]
-    points, normals, areas = integration_points(vertices[np.array(mesh.tri_verts, int)])
+    triangles = _triangles(common)
+    points, normals, areas = integration_points(triangles)
     axis, centre, _ = fitted_axis(points, normals, areas)
     # Facets of two circles disturb that a little; straight walls and outermost corners are exact.
     walls = np.abs(normals @ axis) < WALL
@@ -252,7 +257,7 @@ def _axis_of(common: manifold3d.Manifold) -> tuple[np.ndarray, np.ndarray]:
         form = np.einsum("i,ij,ik->jk", areas[walls], normals[walls], normals[walls])
         axis = np.linalg.eigh(form)[1][:, 0]
     across = np.linalg.svd(axis[None])[2][1:]
-    flat, middle = vertices @ across.T, across @ centre
+    flat, middle = _wall_corners(triangles, axis) @ across.T, across @ centre
     for _ in range(2):  # Corners of the outer circle, as they are seen from the first centre.
         radii = np.linalg.norm(flat - middle, axis=1)
         outermost = flat[radii >= (radii.min() + radii.max()) / 2.0]
@@ -260,6 +265,25 @@ def _axis_of(common: manifold3d.Manifold) -> tuple[np.ndarray, np.ndarray]:
         squares = (outermost**2).sum(axis=1)
         middle = np.linalg.lstsq(system, squares, rcond=None)[0][:2]
     return axis, across.T @ middle + axis * (centre @ axis)
+
+
+def _triangles(shape: manifold3d.Manifold) -> np.ndarray:
+    """Return the corners of a volume's faces, (m, 3, 3) [m]."""
+    mesh = shape.to_mesh64()
+    return np.array(mesh.vert_properties)[:, :3][np.array(mesh.tri_verts, int)]
+
+
+def _wall_corners(triangles: np.ndarray, axis: np.ndarray) -> np.ndarray:
+    """Return the corners (n, 3) of faces along an axis.
+
+    Where faces lie on each other, films of common volume reach beyond a tube; their edges are far
+    smaller than its walls.
+    """
+    first, second, third = (triangles[:, corner] for corner in range(3))
+    doubled = np.cross(second - first, third - first)
+    areas = np.linalg.norm(doubled, axis=1)
+    walls = (np.abs(doubled @ axis) < WALL * areas) & (areas > SLIVER * areas.max(initial=0.0))
+    return (triangles[walls] if walls.any() else triangles).reshape(-1, 3)
 
 
 def _inside_out(

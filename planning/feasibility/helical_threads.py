@@ -38,6 +38,7 @@ TRACE = 0.1  # Of that depth: smaller areas are the rounding of polygons that to
 LEADS = (0.01, 4.0)  # [A] Of the diameter: from the finest threads to screws that push, not turn.
 FUNDAMENTAL = 0.1  # Of the strongest wave: less is leakage of a spectrum of few turns.
 CANDIDATES = 4  # Of the lead, the strongest in the spectrum of the sections.
+HARMONICS = 4  # Waves of the pitch, a half, a third, a fourth of it: the shape of a thread.
 GRID, PADDED = 256, 2048  # Heights at which sections are compared, and length of the transform.
 FIRST_TURN = (1, 2, 3, 5, 7, 10, 13, 17, 20, 24)  # Steps of 15 degrees.
 WAY_OUT = 32  # Further places of the bolt on its way out, spread over all angles.
@@ -80,6 +81,12 @@ def find_helical_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | Non
     axis = np.where(np.abs(found.axis) < ALIGNED, 0.0, found.axis)
     axis = sign * axis / np.linalg.norm(axis)
     middle = found.p_AoC + found.axis * 1e-3 * (pair.low + pair.high) / 2.0
+    # Corners of the crests lie on the nominal diameter; what interlocks is a little less.
+    corners = bolt.vertices - middle
+    along = np.abs(corners @ found.axis) <= 0.5e-3 * (pair.high - pair.low)
+    radii = np.linalg.norm(np.cross(corners[along], found.axis), axis=1)
+    inner, outer = 1e-3 * pair.inner, 1e-3 * pair.outer
+    outer = float(radii[radii < outer + CROSSING * (outer - inner)].max(initial=outer))
     x, y, z = (float(value) + 0.0 for value in axis)
     px, py, pz = (float(value) for value in middle)
     return CadThread(
@@ -87,8 +94,8 @@ def find_helical_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | Non
         nut=nut.name,
         axis=(x, y, z),
         p_AoT=(px, py, pz),
-        diameter=2e-3 * pair.outer,
-        height=1e-3 * (pair.outer - pair.inner),
+        diameter=2.0 * outer,
+        height=outer - inner,
         length=1e-3 * (pair.high - pair.low),
         pitch=1e-3 * lead / starts,
         starts=starts,
@@ -134,8 +141,9 @@ def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
         np.linalg.norm(np.maximum(nut.upper, bolt.upper) - np.minimum(nut.lower, bolt.lower))
     )
     start = -far if thread.both_ways else -thread.length / 2.0
-    outer = thread.diameter / 2.0 / np.cos(np.pi / ROUND)
-    inner = thread.diameter / 2.0 - thread.height
+    # Half a height wider than the teeth, so that no slivers of them are left.
+    outer = (thread.diameter + thread.height) / 2.0 / np.cos(np.pi / ROUND)
+    inner = max((thread.diameter - 3.0 * thread.height) / 2.0, thread.diameter / 8.0)
     tube, bore = (manifold3d.Manifold.cylinder(far - start, r, r, ROUND) for r in (outer, inner))
     x = np.linalg.svd(axis[None])[2][1]
     R_AS = np.array([x, np.cross(axis, x), axis]).T
@@ -203,20 +211,20 @@ class _Pair:
             for w in widths
         )
         spectrum, frequencies = np.asarray(power), np.fft.rfftfreq(PADDED, heights[1] - heights[0])
-        found: list[tuple[float, float]] = []
+        found: list[tuple[float, float, int]] = []
         for waves in range(1, COUNT // 2):
             for hand in (1, -1):
                 leads = waves / np.maximum(frequencies, 1e-9)
                 low, high = (share * 2.0 * self.outer for share in LEADS)
                 own = np.where((leads > low) & (leads < high), spectrum[-hand * waves], 0.0)
-                found.append((float(own.max()), hand * float(leads[own.argmax()])))
+                found.append((float(own.max()), hand * float(leads[own.argmax()]), waves))
         refined = []
-        for _, lead in sorted(found, reverse=True)[:CANDIDATES]:
-            agreement, lead = _refined(lead, widths, heights)
+        every = np.arange(1, COUNT // 2)
+        for _, rough, waves in sorted(found, reverse=True)[:CANDIDATES]:
+            agreement, lead = _refined(rough, waves, widths, heights)
             # The fundamental counts the starts; its harmonics shift by the same lead.
-            waves = np.arange(1, COUNT // 2)
-            places = np.abs(frequencies[:, None] - waves / abs(lead)).argmin(axis=0)
-            strength = spectrum[-np.sign(lead).astype(int) * waves, places]
+            places = np.abs(frequencies[:, None] - every / abs(lead)).argmin(axis=0)
+            strength = spectrum[(-1 if lead > 0.0 else 1) * every, places]
             starts = 1 + int(np.argmax(strength > FUNDAMENTAL * strength.max()))
             refined.append((agreement, lead, starts))
         return [(lead, starts) for _, lead, starts in sorted(refined, reverse=True)]
@@ -260,24 +268,26 @@ def _ends(sections: list[CrossSection]) -> tuple[float, float]:
     return float(boxes[:, 1].min()), float(boxes[:, 3].max())
 
 
-def _refined(lead: float, widths: list[np.ndarray], heights: np.ndarray) -> tuple[float, float]:
-    """Return how well sections lie on each other, 0 to 1, and the lead near a rough one [mm]."""
-    angles = 2.0 * np.pi * np.arange(COUNT)[:, None] / COUNT
-    spacing = heights[1] - heights[0]
+def _refined(
+    lead: float, waves: int, widths: list[np.ndarray], heights: np.ndarray
+) -> tuple[float, float]:
+    """Return how well sections lie on each other, 0 to 1, and the lead near a rough one [mm].
+
+    What they have in common, once shifted back, is a sum of a few waves of the thread's pitch.
+    """
+    orders = waves * np.arange(1, HARMONICS + 1)
+    back = np.exp(-2j * np.pi * np.outer(orders, np.arange(COUNT)) / COUNT)
+    turned = np.concatenate([back @ width for width in widths])
+    total = widths[0].size * sum((width**2).sum() for width in widths)
 
     def agreement(tried: float) -> float:
-        bins = int(np.clip(abs(tried) / (3.0 * spacing), 12, 400))
-        phase = (heights / tried - angles / (2.0 * np.pi)) % 1.0
-        place = (phase * bins).astype(int).clip(0, bins - 1).ravel()
-        count = np.maximum(np.bincount(place, minlength=bins), 1)
-        explained = [
-            (np.bincount(place, width.ravel(), bins) ** 2 / count).sum() for width in widths
-        ]
-        return float(sum(explained) / sum((width**2).sum() for width in widths))
+        along = np.exp(2j * np.pi * np.outer(orders, heights) / tried)
+        common = (turned * np.tile(along, (len(widths), 1))).sum(axis=1)
+        return float(2.0 * (np.abs(common) ** 2).sum() / total)
 
-    reach = min(0.35, abs(lead) / (heights[-1] - heights[0]))
+    reach = min(0.35, abs(lead) / waves / (heights[-1] - heights[0]))
     best = lead
-    for step in (reach / 60.0, reach / 600.0):
-        tried = best * (1.0 + step * np.arange(-60, 61))
+    for step in (reach / 30.0, reach / 450.0):
+        tried = best * (1.0 + step * np.arange(-30, 31))
         best = float(tried[np.argmax([agreement(value) for value in tried])])
     return agreement(best), best

@@ -97,7 +97,7 @@ def fitted_axis(
     weights = areas
     axis, velocity, residuals = np.zeros(3), np.zeros(3), areas
     for _ in range(ROUNDS):
-        form = np.einsum("i,ij,ik->jk", weights, rows, rows)
+        form = (rows * weights[:, None]).T @ rows
         solved = np.linalg.lstsq(form[:3, :3], form[:3, 3:], rcond=1e-9)[0]
         axis = np.linalg.eigh(form[3:, 3:] - form[3:, :3] @ solved)[1][:, 0]
         velocity = -solved @ axis
