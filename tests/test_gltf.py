@@ -88,6 +88,18 @@ def test_gltf_is_read_as_a_tree(glb: Glb, tmp_path: Path) -> None:
     np.testing.assert_allclose(lowest, right, atol=1e-7)
 
 
+def test_poses_may_scale(glb: Glb, tmp_path: Path) -> None:
+    """A mesh in centimetres or so, used at two sizes."""
+    scales = (1e-3, 2e-3, 10.0)
+    glb.header["nodes"] = [{"name": f"at {s}", "mesh": 0, "scale": [s] * 3} for s in scales]
+    glb.header["scenes"] = [{"nodes": [0, 1, 2]}]
+    glb.write(tmp_path / "scaled.glb")
+    product = load_product(tmp_path / "scaled.glb")
+    for scale in scales:
+        size = product.parts[f"at_{scale}"].mesh.extents
+        np.testing.assert_allclose(size, [0.01 * scale] * 3, rtol=1e-5)
+
+
 @pytest.mark.parametrize(
     ("extension", "name"),
     [("KHR_draco_mesh_compression", "Draco"), ("EXT_meshopt_compression", "meshopt")],

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
+from functools import cached_property
+from itertools import chain
 
 import numpy as np
 import trimesh
@@ -44,39 +46,32 @@ def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Seque
         leave_out: Names of parts and of sub-assemblies, of which none is planned.
     """
     named = list(named)
-    names = {name for name, _ in named}
+    taken = {name for name, _ in named}
     parts, known = Parts(), {}
     for name, node in named:
         if unwanted := _among(name, leave_out):
             parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
-        elif not node.surfaces:
+            continue
+        if not node.surfaces:
             parts.left_out.append(LeftOut(name, node.lacking or "empty"))
-        else:
-            scale = np.linalg.det(node.surfaces[0].X_AP[:3, :3])
-            key = (*(id(surface.mesh) for surface in node.surfaces), abs(round(scale, 6)))
-            if key not in known:
-                known[key] = _Shape(node.surfaces)
-            shape, X_AP = known[key], node.surfaces[0].X_AP
-            if shape.bodies.rejected:
-                parts.left_out.append(_left_out(name, shape, X_AP))
-            if shape.one is None:
+            continue
+        X_AP = node.surfaces[0].X_AP
+        key = (*(id(surface.mesh) for surface in node.surfaces), f"{_scale(X_AP):.6g}")
+        if key not in known:
+            known[key] = _Shape(node.surfaces)
+        shape = known[key]
+        if shape.bodies.rejected:
+            parts.left_out.append(_left_out(name, shape, X_AP))
+        for part, mesh in shape.named(name, split, taken):
+            if unwanted := _among(part, leave_out):
+                parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
                 continue
-            if split and len(shape.objects) > 1:
-                labels = _body_names(name, [label for label, _ in shape.objects], names)
-                bodies = list(zip(labels, (solid for _, solid in shape.objects), strict=True))
-                names.update(labels)
-            else:
-                bodies = [(name, shape.one)]
-            if len(shape.objects) > len(bodies):
-                parts.several[name] = len(shape.objects)
-                parts.united += [name] if shape.is_united else []
-            for part, mesh in bodies:
-                if unwanted := _among(part, leave_out):
-                    parts.left_out.append(LeftOut(unwanted, NOT_WANTED))
-                    continue
-                parts.meshes[part] = shape.placed(mesh, X_AP)
-                if shape.bodies.repair:
-                    parts.repairs[part] = shape.bodies.repair
+            parts.meshes[part] = shape.placed(mesh, X_AP)
+            if shape.bodies.repair:
+                parts.repairs[part] = shape.bodies.repair
+        if not split and len(shape.bodies.solids) > 1:
+            parts.several[name] = len(shape.bodies.solids)
+            parts.united += [name] if shape.one[1] else []
     return parts
 
 
@@ -85,29 +80,49 @@ def _among(name: str, names: Iterable[str]) -> str:
     return next((n for n in names if name == n or name.startswith(f"{n}/")), "")
 
 
+def _scale(X: np.ndarray) -> float:
+    """Return by what a pose (4, 4) multiplies lengths."""
+    return float(abs(np.linalg.det(X[:3, :3])) ** (1.0 / 3.0))
+
+
 class _Shape:
     """The bodies of the surfaces of one part, which all its instances share."""
 
     def __init__(self, surfaces: Sequence[Surface]) -> None:
         # A pose may scale, and what counts as a rounding error is known in metres only.
-        scale = abs(np.linalg.det(surfaces[0].X_AP[:3, :3])) ** (1.0 / 3.0)
+        scale = _scale(surfaces[0].X_AP)
         self._scale = 1.0 if np.isclose(scale, 1.0, rtol=0.1) else scale
         meshes = [self._in_meters(surface.mesh) for surface in surfaces]
-        bodies = [bodies_of(mesh) for mesh in meshes]
-        self.objects = [
-            (surface.name, solid)
-            for surface, found in zip(surfaces, bodies, strict=True)
-            for solid in found.solids
-        ]
-        self.bodies = bodies[0]
-        if len(bodies) > 1:
-            whole = bodies_of(merged(joined(meshes)))
-            if sum(len(found.rejected) for found in bodies) > len(whole.rejected):
-                # Objects that are faces of a body, by colour or material: they close together only.
-                self.objects = [("", solid) for solid in whole.solids]
-            solids = tuple(solid for _, solid in self.objects)
-            self.bodies = Bodies(solids, whole.rejected, whole.repair)
-        self.one, self.is_united = self.bodies.as_one() if self.objects else (None, False)
+        found = [bodies_of(mesh) for mesh in meshes]
+        labels = [s.name for s, f in zip(surfaces, found, strict=True) for _ in f.solids]
+        self.bodies = found[0]
+        if len(found) > 1:
+            solids, rejected = (
+                tuple(chain.from_iterable(each))
+                for each in zip(*((f.solids, f.rejected) for f in found), strict=True)
+            )
+            repairs = dict.fromkeys(f.repair for f in found if f.repair)
+            self.bodies = Bodies(solids, rejected, "; ".join(repairs))
+            # Objects may be faces of a body, by colour or material, which only close together.
+            whole = bodies_of(merged(joined(meshes))) if rejected else self.bodies
+            if len(whole.rejected) < len(rejected):
+                self.bodies, labels = whole, [""] * len(whole.solids)
+        self._labels = labels
+
+    @cached_property
+    def one(self) -> tuple[trimesh.Trimesh, bool]:
+        """All bodies as one surface, and whether they overlapped and were united."""
+        return self.bodies.as_one()
+
+    def named(self, name: str, split: bool, taken: set[str]) -> list[tuple[str, trimesh.Trimesh]]:
+        """Return the part, or its bodies, with names that are not taken, and are from now on."""
+        if not self.bodies.solids:
+            return []
+        if not split or len(self.bodies.solids) == 1:
+            return [(name, self.one[0])]
+        names = _body_names(name, self._labels, taken)
+        taken.update(names)
+        return list(zip(names, self.bodies.solids, strict=True))
 
     def _in_meters(self, mesh: trimesh.Trimesh) -> trimesh.Trimesh:
         return mesh if self._scale == 1.0 else mesh.copy().apply_scale(self._scale)
@@ -142,4 +157,4 @@ def _left_out(name: str, shape: _Shape, X_AP: np.ndarray) -> LeftOut:
     reason = pieces[0].text(shape.pose(X_AP))
     if len(pieces) > 1:
         reason += f", and {len(pieces) - 1} more pieces"
-    return LeftOut(name if shape.one is None else f"a surface in {name}", reason)
+    return LeftOut(f"a surface in {name}" if shape.bodies.solids else name, reason)
