@@ -19,8 +19,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planning.feasibility.algorithm import choose_posture
-from planning.feasibility.directions import opposite, rotation_with_up
+from planning.feasibility.algorithm import choose_posture, open_postures
+from planning.feasibility.directions import DIRECTIONS, opposite, rotation_with_up
+from planning.feasibility.slanted import Slanted
 from planning.feasibility.solids import Solid
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.fixture_analysis.footprint import (
@@ -48,6 +49,7 @@ class Objective:
         parts: Per item the names of its parts.
         up: Axis of the product frame that points up on the jig.
         setup: For the jig, and the force with which a part is pressed into it.
+        slanted: Slanted directions, which the items know by their labels.
     """
 
     items: Items
@@ -55,6 +57,7 @@ class Objective:
     parts: Sequence[Sequence[str]]
     up: str
     setup: FixtureSetup
+    slanted: Sequence[Slanted] = ()
     _stages: dict[int, tuple[int, int]] = field(default_factory=dict)
     _outlines: dict[int, Footprint | None] = field(default_factory=dict)
     _bearing: dict[int, Footprint | None] = field(default_factory=dict)
@@ -79,7 +82,9 @@ class Objective:
     def refixes(self, rest: int, item: int) -> bool:
         """Return whether Algorithm 1 fixes the item instead of the set it is added to."""
         against = opposite(self.up)
-        directions = self.items.directions(item, rest)
+        ways = self.items.directions(item, rest)
+        slanted = [way.direction for way in self.slanted if way.label in ways]
+        directions = open_postures((j for j in ways if j in DIRECTIONS), slanted, self.up)
         if against not in directions:
             return False
         if self.up not in directions:
