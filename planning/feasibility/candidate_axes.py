@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import linprog
+from scipy.optimize import nnls
 
 from planning.feasibility.contact_normals import distinct, facing
 from planning.feasibility.solids import Solid, boxes_apart
@@ -121,15 +121,15 @@ def _null_axis(normals: np.ndarray, areas: np.ndarray) -> list[tuple[np.ndarray,
 def _middle_of_cone(normals: np.ndarray) -> np.ndarray:
     """Return the direction (3,) that goes furthest away from all faces; zero if none does.
 
-    The largest smallest component along the normals, within a cube: a linear programme.
+    It is that of the shortest vector in the convex hull of the normals, which a non-negative
+    least-squares problem yields up to its length.
     """
-    result = linprog(
-        [0.0, 0.0, 0.0, -1.0],
-        A_ub=np.column_stack([-normals, np.ones(len(normals))]),
-        b_ub=np.zeros(len(normals)),
-        bounds=[(-1.0, 1.0)] * 3 + [(0.0, 1.0)],
-    )
-    return np.asarray(result.x[:3]) if result.success and result.x[3] > ALONG else np.zeros(3)
+    weights, _ = nnls(np.vstack([normals.T, np.ones(len(normals))]), np.array([0.0, 0, 0, 1]))
+    shortest = weights @ normals
+    length = float(np.linalg.norm(shortest))
+    if length < ALONG or (normals @ shortest).min() < ALONG * length:
+        return np.zeros(3)
+    return shortest / length
 
 
 def _own_axes(solid: Solid) -> list[np.ndarray]:

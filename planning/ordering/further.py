@@ -27,6 +27,7 @@ from planning.ordering.separation import locked_core, split
 MOST_TESTED = 60  # [A] Axes tested exactly.
 MOST_TRIANGLES = 10_000_000  # [M] Times axes tested exactly: some seconds.
 EXTRA = 4  # [A] Axes that are kept beside those needed: they may hold a part in a better posture.
+EXTRA_TRIANGLES = 400_000  # [M] Times axes: extra ones only as far as they take no second.
 
 
 @dataclass(frozen=True)
@@ -116,12 +117,11 @@ class _Search:
     def result(self) -> FurtherWays:
         """Return the needed directions, and some more that free something, for all parts."""
         kept = list(self.needed)
-        if kept:
-            more = (k for k in range(len(self.axes)) if k not in kept)
-            useful = [k for k in more if self._may_split(k, self.core)]
-            useful = [k for k in useful[:EXTRA] if self._test(k) and self._splits(k, self.core)]
-            spare = MOST_TRIANGLES // max(1, sum(len(solid.faces) for solid in self.solids))
-            kept += useful[: max(0, spare - len(kept))]
+        all_triangles = sum(len(solid.faces) for solid in self.solids)
+        extra = min(EXTRA, EXTRA_TRIANGLES // max(1, all_triangles)) if kept else 0
+        more = (k for k in range(len(self.axes)) if k not in kept)
+        useful = [k for k in more if extra and self._may_split(k, self.core)][:extra]
+        kept += [k for k in useful if self._test(k) and self._splits(k, self.core)]
         slanted = [
             way for k in kept for way in slanted_pair(self.solids, self.axes[k], self.tolerance)
         ]
