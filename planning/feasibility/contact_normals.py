@@ -16,7 +16,7 @@ from planning.feasibility.solids import Solid, boxes_apart
 OPPOSED = 0.99  # Cosine of 8 degrees: facets of a coarse cylinder on a fine one.
 SAME_DIRECTION = 0.9998  # Cosine of 1 degree.
 ROWS = 400_000  # Pairs of boxes compared at once: bounds the memory to some MB.
-WIDEST = 600  # [M] Faces of a part near another, widest first: 20 ms a pair at most.
+WIDEST = 400  # [M] Faces of a part near another, widest first: 10 ms a pair at most.
 LEAST_AREA = 0.01  # [A] Of the tolerance squared: less common area than that is rounding.
 
 

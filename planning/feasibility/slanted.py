@@ -78,16 +78,33 @@ def turned_to_z(solid: Solid, axis: np.ndarray) -> Solid:
     return Solid(solid.name, solid.vertices @ R.T, solid.faces, solid.mass, R @ solid.p_AoG)
 
 
-def axis_matrix(
-    solids: Sequence[Solid], axis: np.ndarray, tolerance: float
-) -> tuple[np.ndarray, np.ndarray]:
-    """Return M_d (n, n) int and its margins [m] for an axis (3,); the other way is M_d^T."""
-    _, decided = _decided(solids, axis, tolerance)
-    return _matrices(decided, len(solids), tolerance)
+Decided = Mapping[tuple[int, int], Decision]
+"""A decision for each ordered pair (moving, stationary) of parts that is not free at once."""
+
+
+def decided_along(solids: Sequence[Solid], axis: np.ndarray, tolerance: float) -> Decided:
+    """Decide which parts block which others along an axis (3,); others are free."""
+    return decisions(_views(solids, axis), tolerance)
+
+
+def axis_matrix(decided: Decided, count: int, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
+    """Return M_d (n, n) int and its margins [m] of n parts; those of the other way are transposed.
+
+    Args:
+        decided: As ``decided_along`` returned it.
+        count: Number n of parts.
+        tolerance: As for the six directions [m].
+    """
+    free = 1 - np.eye(count, dtype=int)
+    margin = np.full((count, count), FRAGILE * tolerance)
+    for pair, decision in decided.items():
+        free[pair] = int(decision.point is None)
+        margin[pair] = decision.margin
+    return free, margin
 
 
 def slanted_pair(
-    solids: Sequence[Solid], axis: np.ndarray, tolerance: float
+    solids: Sequence[Solid], axis: np.ndarray, tolerance: float, decided: Decided | None = None
 ) -> tuple[Slanted, Slanted]:
     """Return both directions of an axis (3,) with their evidence.
 
@@ -95,13 +112,15 @@ def slanted_pair(
         solids: The n parts in matrix order, threads cut out.
         axis: Unit vector in A.
         tolerance: As for the six directions [m].
+        decided: What ``decided_along`` returned for all these parts, if it is known already.
     """
-    views, decided = _decided(solids, axis, tolerance)
-    free, margin = _matrices(decided, len(solids), tolerance)
+    if decided is None:
+        decided = decided_along(solids, axis, tolerance)
+    free, margin = axis_matrix(decided, len(solids), tolerance)
     ways = [tuple(float(value) + 0.0 for value in sign * axis) for sign in (1.0, -1.0)]
     forward, backward = (direction_label(way) for way in ways)
     there, back = [], []
-    for hit in evidence_of_hits(views, "+z", decided, tolerance):
+    for hit in evidence_of_hits(_views(solids, axis), "+z", decided, tolerance):
         p_AoQ = _rotation(axis).T @ np.array(hit.p_AoQ)
         p_start = p_AoQ - hit.travel * axis
         there.append(_blocker(hit.moving, hit.staying, forward, p_AoQ, hit.travel))
@@ -121,22 +140,8 @@ def _rotation(axis: np.ndarray) -> np.ndarray:
     return np.array([across, np.cross(axis, across), axis])
 
 
-def _decided(
-    solids: Sequence[Solid], axis: np.ndarray, tolerance: float
-) -> tuple[list[Envelope], dict[tuple[int, int], Decision]]:
-    views = [envelope(turned_to_z(solid, axis), axis=2) for solid in solids]
-    return views, decisions(views, tolerance)
-
-
-def _matrices(
-    decided: Mapping[tuple[int, int], Decision], count: int, tolerance: float
-) -> tuple[np.ndarray, np.ndarray]:
-    free = 1 - np.eye(count, dtype=int)
-    margin = np.full((count, count), FRAGILE * tolerance)
-    for pair, decision in decided.items():
-        free[pair] = int(decision.point is None)
-        margin[pair] = decision.margin
-    return free, margin
+def _views(solids: Sequence[Solid], axis: np.ndarray) -> list[Envelope]:
+    return [envelope(turned_to_z(solid, axis), axis=2) for solid in solids]
 
 
 def _blocker(moving: str, staying: str, label: str, p_AoQ: np.ndarray, travel: float) -> Blocker:

@@ -19,7 +19,7 @@ import numpy as np
 from scipy.sparse.csgraph import connected_components
 
 from planning.feasibility.candidate_axes import body_normals, candidate_axes, local_hits
-from planning.feasibility.slanted import Slanted, axis_matrix, slanted_pair
+from planning.feasibility.slanted import Decided, Slanted, axis_matrix, decided_along, slanted_pair
 from planning.feasibility.solids import Solid
 from planning.ordering.items import Items, items_of, members
 from planning.ordering.separation import locked_core, split
@@ -81,6 +81,7 @@ class _Search:
     tested: dict[int, Mapping[str, tuple[int, ...]]] = field(default_factory=dict)
     needed: list[int] = field(default_factory=list)
     refused: set[int] = field(default_factory=set)
+    decided: dict[int, Decided] = field(default_factory=dict)
 
     def propose(self, axes: Sequence[Sequence[float]]) -> None:
         """Collect candidate axes from the contacts in the core."""
@@ -123,7 +124,9 @@ class _Search:
         useful = [k for k in more if extra and self._may_split(k, self.core)][:extra]
         kept += [k for k in useful if self._test(k) and self._splits(k, self.core)]
         slanted = [
-            way for k in kept for way in slanted_pair(self.solids, self.axes[k], self.tolerance)
+            way
+            for k in kept
+            for way in slanted_pair(self.solids, self.axes[k], self.tolerance, self.decided.get(k))
         ]
         return FurtherWays(tuple(slanted), 2 * (len(self.axes) - len(self.refused)))
 
@@ -149,8 +152,11 @@ class _Search:
 
     def _exact(self, k: int) -> Mapping[str, tuple[int, ...]]:
         """Return which items of the core hit which along an axis and against it."""
-        at = [p for i in self.numbers for p in self.parts[i]]
-        among, _ = axis_matrix([self.solids[p] for p in at], self.axes[k], self.tolerance)
+        at = sorted(p for i in self.numbers for p in self.parts[i])
+        decided = decided_along([self.solids[p] for p in at], self.axes[k], self.tolerance)
+        if at == list(range(len(self.solids))):  # All parts: the same will be asked for again.
+            self.decided[k] = decided
+        among, _ = axis_matrix(decided, len(at), self.tolerance)
         free = np.ones((len(self.solids), len(self.solids)), int)
         free[np.ix_(at, at)] = among
         both = {f"+{k}": free, f"-{k}": free.T}

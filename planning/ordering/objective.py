@@ -38,7 +38,7 @@ from planning.ordering.search import Cost
 HEIGHT_UNIT = 1e-6
 # [M] Imprints computed at most where slanted directions are in use, 50 ms each: all stages of a
 # product drawn at an angle stand on an edge. Beyond them, what has no footprint counts as unstable.
-MOST_IMPRINTS = 100
+MOST_IMPRINTS = 40
 ROUNDING = 1e-10  # [m] Keeps rounding errors from deciding heights half-way between two units.
 
 

@@ -98,7 +98,13 @@ class Division:
             return self.drops(parts), group.bit_count(), group
 
         found = {side for part in leaving_groups(items, core) for side in (part, core ^ part)}
-        whole = (g for g in found if items.connected(g) and items.connected(core ^ g))
+        others = items.everything ^ core  # They may connect the rest of the core.
+        whole = (
+            g
+            for g in found
+            if items.connected(g)
+            and (items.connected(core ^ g) or items.connected(core ^ g | others))
+        )
         return sorted(whole, key=rank)
 
 
