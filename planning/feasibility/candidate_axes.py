@@ -19,7 +19,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from itertools import combinations
 
 import numpy as np
-from scipy.optimize import nnls
+from scipy.optimize import linprog
 
 from planning.feasibility.contact_normals import distinct, facing
 from planning.feasibility.solids import Solid, boxes_apart
@@ -29,6 +29,7 @@ ON_AXIS = 1.0 - 5e-7  # Cosine of 1 mrad: the same as one of the six directions.
 SAME_AXIS = 1.0 - 2e-6  # Cosine of 2 mrad: over 25 mm, the usual tolerance of 0.05 mm.
 NULL = 1e-4  # [D] Square of 0.6 degrees: share of the normals' spread along an axis across them.
 MOST_NORMALS = 10  # [A] Widest of a body, of which edges are made.
+CONE_FACES = 60  # [A] Widest normals of a body that bound its cone.
 MOST_AXES = 400  # [A] Proposed, those of the largest faces first.
 EDGE, CONE, OWN = 0.5, 0.25, 0.02  # [A] Weight of an axis that no face looks along, per area.
 
@@ -119,17 +120,21 @@ def _null_axis(normals: np.ndarray, areas: np.ndarray) -> list[tuple[np.ndarray,
 
 
 def _middle_of_cone(normals: np.ndarray) -> np.ndarray:
-    """Return the direction (3,) that goes furthest away from all faces; zero if none does.
+    """Return the direction (3,) that goes furthest away from the widest faces, or zero.
 
-    It is that of the shortest vector in the convex hull of the normals, which a non-negative
-    least-squares problem yields up to its length.
+    The largest smallest component along the normals, within a cube: a linear programme. Between
+    two opposed faces there is no such direction.
     """
-    weights, _ = nnls(np.vstack([normals.T, np.ones(len(normals))]), np.array([0.0, 0, 0, 1]))
-    shortest = weights @ normals
-    length = float(np.linalg.norm(shortest))
-    if length < ALONG or (normals @ shortest).min() < ALONG * length:
+    own = normals[:CONE_FACES]
+    if (own @ own.T).min() < -1.0 + ALONG:
         return np.zeros(3)
-    return shortest / length
+    result = linprog(
+        [0.0, 0.0, 0.0, -1.0],
+        A_ub=np.column_stack([-own, np.ones(len(own))]),
+        b_ub=np.zeros(len(own)),
+        bounds=[(-1.0, 1.0)] * 3 + [(0.0, 1.0)],
+    )
+    return np.asarray(result.x[:3]) if result.success and result.x[3] > ALONG else np.zeros(3)
 
 
 def _own_axes(solid: Solid) -> list[np.ndarray]:

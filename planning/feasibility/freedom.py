@@ -1,9 +1,11 @@
-"""Slanted removal directions and local freedom: what the six directions do not cover.
+"""Local freedom of the parts of a step, and all ways out at an angle: a report for the reader.
 
-Candidate directions come from contact. Where two faces lie on each other, the incoming part cannot
-move against the target's normal there. The directions that all those normals allow form a cone; its
-edges (along two contact faces at once), the normals of its faces and the axes of threads are tried,
-first against the contact normals, then exactly against the whole shapes, as for the six.
+What a plan needs of slanted directions it finds itself (``planning.ordering.further``). This looks
+at one step more closely. Candidate directions come from contact: where two faces lie on each other,
+the incoming part cannot move against the target's normal there. The directions that all those
+normals allow form a cone; its edges (along two contact faces at once), the normals of its faces and
+the axes of threads are tried, first against the contact normals, then exactly against the whole
+shapes, as for the six.
 
 Local freedom is the distance that a part can move before it hits something: the clearance to the
 faces ahead of it, over their common projection. It is infinite only if the part leaves.
@@ -23,6 +25,7 @@ from planning.feasibility.contact_normals import SAME_DIRECTION, contact_normals
 from planning.feasibility.directions import DIRECTIONS, unit_vector
 from planning.feasibility.envelope import Envelope, envelope
 from planning.feasibility.face_pairs import overlapping_faces
+from planning.feasibility.slanted import turned_to_z
 from planning.feasibility.solids import Solid
 
 ALONG = 0.01  # Sine of 0.6 degrees: sliding along a face, within its rounding.
@@ -83,15 +86,8 @@ def freedom_along(
     incoming: Sequence[Solid], target: Sequence[Solid], direction: np.ndarray, tolerance: float
 ) -> Freedom:
     """Return how far parts can move along one direction (3,)."""
-    side = np.eye(3)[int(np.abs(direction).argmin())]
-    across = np.cross(side, direction)
-    across /= np.linalg.norm(across)
-    R = np.array([across, np.cross(direction, across), direction])  # Brings the direction to +z.
     views = [
-        [
-            envelope(Solid(s.name, s.vertices @ R.T, s.faces, s.mass, R @ s.p_AoG), axis=2)
-            for s in solids
-        ]
+        [envelope(turned_to_z(solid, direction), axis=2) for solid in solids]
         for solids in (incoming, target)
     ]
     x, y, z = (float(value) for value in direction)
