@@ -28,7 +28,7 @@ from planning import load_plan, plan, save_plan
 from planning.assembly_plan.explain import step_texts
 from planning.assembly_plan.plan_file import plan_to_dict
 from planning.feasibility.algorithm import leaving_way, open_postures
-from planning.feasibility.candidate_axes import body_normals, candidate_axes
+from planning.feasibility.candidate_axes import body_normals, candidate_axes, local_hits
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import FIT_TOLERANCE, interference
 from planning.feasibility.slanted import (
@@ -74,7 +74,7 @@ def pin_at(degrees: float, width: float = 60.0) -> Product:
 
 def tunnel() -> dict[str, Manifold]:
     """A prism between two inclined faces and a floor: it leaves along their common edge only."""
-    section = CrossSection([[(-10.0, 0.0), (10.0, 0.0), (0.0, 12.0)]])
+    section = CrossSection([np.array([(-10.0, 0.0), (10.0, 0.0), (0.0, 12.0)])])
     hole = section.extrude(60).translate([0, 0, -20])
     return {
         "block": box((40, 40, 60), (-20, -15, -30)) - hole,
@@ -184,7 +184,7 @@ def test_a_prism_leaves_along_the_edge_of_two_faces(seed):
 
 
 def test_a_dovetail_at_an_angle():
-    section = CrossSection([[(-10.0, 0.0), (10.0, 0.0), (6.0, 8.0), (-6.0, 8.0)]])
+    section = CrossSection([np.array([(-10.0, 0.0), (10.0, 0.0), (6.0, 8.0), (-6.0, 8.0)])])
     shapes = {
         "bed": box((60, 18, 60), (-30, -10, -25)) - section.extrude(60).translate([0, 0, -20]),
         "slide": section.extrude(40).translate([0, 0, -20]),
@@ -305,6 +305,14 @@ def test_candidates_of_a_pin_begin_with_its_axis():
     angle = np.deg2rad(36.0)
     np.testing.assert_allclose(axes[0], [np.sin(angle), 0, np.cos(angle)], atol=1e-6)
     assert (np.abs(axes).max(axis=1) < 1.0 - 1e-7).all()
+
+
+def test_edges_that_touch_propose_nothing_but_the_parts_own_axes():
+    low = solid(box((10, 10, 10), (-5, -5, -5)).rotate([10, 20, 30]))
+    high = solid(box((10, 10, 10), (-5, -5, -5)).rotate([10, 20, 30]).translate([30, 0, 0]))
+    normals = {(0, 1): (np.zeros((0, 3)), np.zeros(0))}
+    assert len(candidate_axes([low, high], normals)) >= 1
+    assert not local_hits(np.eye(3), normals, 2).any()
 
 
 def shapes_of(degrees: float) -> list[Manifold]:

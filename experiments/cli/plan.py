@@ -43,7 +43,7 @@ class Plan:
     """Gap that still touches, overlap that does not block. Default: the product's, or derived."""
 
     slanted: bool = False
-    """Also report ways out at an angle, from contact faces, and how far parts can move at all."""
+    """Also report every way out at an angle, needed or not, and how far parts can move at all."""
 
     no_cache: bool = False
     """Compute the matrices anew, and do not keep them in the user's cache."""

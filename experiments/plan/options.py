@@ -17,7 +17,7 @@ class PlanOptions:
         group: Whether identical parts form groups.
         tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
         cache: Folder of the matrix cache; None for no cache.
-        slanted: Whether to search for slanted removal directions and local freedom.
+        slanted: Whether to report all slanted removal directions and local freedom of each step.
         up: Axis that points up on the jig, "+x" ... "-z"; None for the product's.
     """
 

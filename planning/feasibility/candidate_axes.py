@@ -123,10 +123,10 @@ def _middle_of_cone(normals: np.ndarray) -> np.ndarray:
     """Return the direction (3,) that goes furthest away from the widest faces, or zero.
 
     The largest smallest component along the normals, within a cube: a linear programme. Between
-    two opposed faces there is no such direction.
+    two opposed faces there is no such direction, and edges that touch have no normals.
     """
     own = normals[:CONE_FACES]
-    if (own @ own.T).min() < -1.0 + ALONG:
+    if not len(own) or (own @ own.T).min() < -1.0 + ALONG:
         return np.zeros(3)
     result = linprog(
         [0.0, 0.0, 0.0, -1.0],
