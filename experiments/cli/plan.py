@@ -64,7 +64,7 @@ class Plan:
     """Declare that a part bends or stretches over what is in its way, like a belt. Repeatable."""
 
     slanted: bool = False
-    """Also report ways out at an angle, from contact faces, and how far parts can move at all."""
+    """Also report every way out at an angle, needed or not, and how far parts can move at all."""
 
     no_cache: bool = False
     """Compute the matrices anew, and do not keep them in the user's cache."""

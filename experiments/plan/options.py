@@ -16,7 +16,7 @@ class PlanOptions:
         read: How the product is read.
         tolerance: Largest gap that counts as contact and largest overlap that does not block [m].
         cache: Folder of the matrix cache; None for no cache.
-        slanted: Whether to search for slanted removal directions and local freedom.
+        slanted: Whether to report all slanted removal directions and local freedom of each step.
         up: Axis that points up on the jig, "+x" ... "-z"; None for the product's.
         accept, press, snap, flexible: What is declared, as ``declared_from`` reads it.
     """

@@ -14,6 +14,7 @@ from planning.feasibility.directions import DIRECTIONS, open_directions
 from planning.feasibility.evidence_format import point_text
 from planning.feasibility.interference import Blocker
 from planning.feasibility.order import subassembly_name
+from planning.feasibility.slanted import direction_label
 from planning.ordering.advice_format import precedence_text
 
 MOST_LISTED = 20  # Overlaps; the file holds all.
@@ -42,11 +43,14 @@ def step_table(plan: FixingPlan) -> Table:
 
 
 def stop_text(plan: FixingPlan) -> str:
-    """Return why Algorithm 1 stopped, with the evidence for each direction; "" if it did not."""
+    """Return what is not planned and why, with the evidence for each direction; "" if all is."""
+    lines = [f"Not planned: {item.name} {item.reason}." for item in plan.unplanned]
+    if plan.likely_cause:
+        lines.append(f"Likely cause: {plan.likely_cause}.")
     if plan.stop is None:
-        return ""
+        return "\n".join(lines)
     stop, target = plan.stop, subassembly_name(plan.order[: len(plan.steps) + 1])
-    lines = [f"Infeasible: {stop.item} cannot be added to {target}: {stop.reason}."]
+    lines.append(f"Infeasible: {stop.item} cannot be added to {target}: {stop.reason}.")
     return "\n".join(lines + [f"  {blocker_text(blocker)}" for blocker in stop.blockers])
 
 
@@ -104,7 +108,8 @@ def step_texts(plan: FixingPlan) -> list[str]:
     """Return each step's A list and reason."""
     return [
         f"  A({subassembly_name(plan.order[: number + 1])}; {step.item}): "
-        f"{', '.join(open_directions(step.directions))}. {step.reason}"
+        f"{', '.join([*open_directions(step.directions), *map(direction_label, step.slanted)])}. "
+        f"{step.reason}"
         for number, step in enumerate(plan.steps)
     ]
 

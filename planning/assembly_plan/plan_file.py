@@ -12,12 +12,15 @@ from typing import Any
 import numpy as np
 
 from cell.errors import InputError
+from planning.assembly_plan.order_search import SubassemblyPlan
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING, FixingStep, Stop
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence_format import evidence_from_dict, evidence_to_dict
 from planning.feasibility.interference import Blocker
+from planning.feasibility.slanted import Slanted
 from planning.ordering.advice_format import advice_from_dict, advice_to_dict
+from planning.ordering.unplanned import Unplanned
 
 
 def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
@@ -31,7 +34,11 @@ def plan_to_dict(plan: FixingPlan) -> dict[str, Any]:
         "contact": plan.contact.tolist(),
         "free": {j: plan.free[j].tolist() for j in DIRECTIONS},
         "reachable": {j: plan.reachable[j].tolist() for j in DIRECTIONS},
+        "slanted": [_slanted_to_dict(way, plan.contact) for way in plan.slanted],
         "steps": [_step_to_dict(step) for step in plan.steps],
+        "subassemblies": [_subassembly_to_dict(built) for built in plan.subassemblies],
+        "unplanned": [asdict(item) for item in plan.unplanned],
+        "likely_cause": plan.likely_cause,
         "stopped": _stop_to_dict(plan.stop) if plan.stop else None,
         "blockers": [_blocker_to_dict(blocker) for blocker in plan.blockers],
         "orders": advice_to_dict(plan.orders) if plan.orders else None,
@@ -55,6 +62,10 @@ def plan_from_dict(data: Mapping[str, Any]) -> FixingPlan:
         seconds=data["seconds"],
         orders=advice_from_dict(data["orders"]) if data["orders"] else None,
         evidence=evidence_from_dict(data["evidence"]) if data["evidence"] else None,
+        slanted=tuple(_slanted_from_dict(way) for way in data["slanted"]),
+        subassemblies=tuple(_subassembly_from_dict(built) for built in data["subassemblies"]),
+        unplanned=tuple(Unplanned(**item) for item in data["unplanned"]),
+        likely_cause=data["likely_cause"],
     )
 
 
@@ -92,6 +103,8 @@ def load_plan(file: Path) -> FixingPlan:
 
 def _step_to_dict(step: FixingStep) -> dict[str, Any]:
     data = asdict(step) | {"target": list(step.target), "incoming": list(step.incoming)}
+    data["leaves_along"] = list(step.leaves_along)
+    data["slanted"] = [list(way) for way in step.slanted]
     data["cog_height_m"] = data.pop("cog_height")
     return data
 
@@ -99,8 +112,43 @@ def _step_to_dict(step: FixingStep) -> dict[str, Any]:
 def _step_from_dict(data: Mapping[str, Any]) -> FixingStep:
     fields: dict[str, Any] = dict(data)
     fields["target"], fields["incoming"] = tuple(data["target"]), tuple(data["incoming"])
+    fields["leaves_along"] = tuple(data["leaves_along"])
+    fields["slanted"] = tuple(tuple(way) for way in data["slanted"])
     fields["cog_height"] = fields.pop("cog_height_m")
     return FixingStep(**fields)
+
+
+def _slanted_to_dict(way: Slanted, contact: np.ndarray) -> dict[str, Any]:
+    return {
+        "direction": list(way.direction),
+        "free": way.free.tolist(),
+        "reachable": ((contact + contact.T) * way.free).tolist(),
+        "blockers": [_blocker_to_dict(blocker) for blocker in way.blockers],
+    }
+
+
+def _slanted_from_dict(data: Mapping[str, Any]) -> Slanted:
+    x, y, z = data["direction"]
+    blockers = tuple(_blocker_from_dict(blocker) for blocker in data["blockers"])
+    return Slanted((x, y, z), np.array(data["free"], int), None, blockers)
+
+
+def _subassembly_to_dict(built: SubassemblyPlan) -> dict[str, Any]:
+    return {
+        "name": built.name,
+        "parts": list(built.parts),
+        "order": list(built.order),
+        "steps": [_step_to_dict(step) for step in built.steps],
+    }
+
+
+def _subassembly_from_dict(data: Mapping[str, Any]) -> SubassemblyPlan:
+    return SubassemblyPlan(
+        data["name"],
+        tuple(data["parts"]),
+        tuple(data["order"]),
+        tuple(_step_from_dict(step) for step in data["steps"]),
+    )
 
 
 def _stop_to_dict(stop: Stop) -> dict[str, Any]:

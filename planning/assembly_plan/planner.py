@@ -12,7 +12,8 @@ import numpy as np
 from cell.configuration.config import CellConfig
 from cell.errors import InputError, UnknownName
 from cell.products.product import Product
-from planning.feasibility.algorithm import FixingStep, Stop, configure_fixing
+from planning.assembly_plan.order_search import OrderSearch, SubassemblyPlan, named_subassemblies
+from planning.feasibility.algorithm import FixingStep, Stop
 from planning.feasibility.cache import cached_matrices
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence import Evidence, evidence_of
@@ -20,8 +21,11 @@ from planning.feasibility.interference import Blocker
 from planning.feasibility.matrices import AssemblyMatrices, matrices_of, reachable_matrices
 from planning.feasibility.order import check_order
 from planning.feasibility.overlaps import Overlap
+from planning.feasibility.pose_doubt import pose_doubt
+from planning.feasibility.slanted import Slanted
 from planning.fixture_analysis.candidate import FixtureSetup
-from planning.ordering.advice import OrderAdvice, advise, fallback_order
+from planning.ordering.advice import OrderAdvice, with_groups
+from planning.ordering.unplanned import Unplanned, overlapping_items, stray_items
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,6 +46,12 @@ class FixingPlan:
         evidence: Basis of the matrices: tolerance, threads, margins, remarks on the input.
         orders: The best orders; None if an order was requested and is feasible.
         matrices: Matrices with the parts' geometry; None for a plan that was read from a file.
+        slanted: Slanted directions that the plan uses or may use, two per axis; none where the six
+            suffice.
+        subassemblies: What the order contains as one item because single items lock each other;
+            each after those it is built of.
+        unplanned: Items that are not in the order, with the reasons: strays, for example.
+        likely_cause: What is probably wrong with the input of a plan that fails; "" if unknown.
     """
 
     product: str
@@ -57,11 +67,15 @@ class FixingPlan:
     evidence: Evidence | None = None
     orders: OrderAdvice | None = None
     matrices: AssemblyMatrices | None = None
+    slanted: tuple[Slanted, ...] = ()
+    subassemblies: tuple[SubassemblyPlan, ...] = ()
+    unplanned: tuple[Unplanned, ...] = ()
+    likely_cause: str = ""
 
     @property
     def feasible(self) -> bool:
-        """Whether every item of the order can be added, and no parts overlap that must not."""
-        return self.stop is None and not self.overlaps
+        """Whether every item of the product can be added, and no overlap is unexplained."""
+        return self.stop is None and not self.unplanned and not self.overlaps
 
     @property
     def overlaps(self) -> tuple[Overlap, ...]:
@@ -90,8 +104,8 @@ def plan(
         tolerance: Largest gap that counts as contact and largest overlap that does not block a
             motion [m]; None for the product's own, or one derived from its sizes and clearances.
         cache: Folder of the matrix cache; None to compute the matrices without it.
-        slanted: Whether to search, in each step, for slanted removal directions and local freedom.
-            They are reported; the steps follow from the six directions alone.
+        slanted: Whether to report, for each step, all slanted removal directions and local freedom.
+            Slanted directions that a plan needs are found and used without it.
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
@@ -100,26 +114,27 @@ def plan(
     An order that is well formed but infeasible is a result, not an error: see ``FixingPlan.stop``.
     """
     started = time.perf_counter()
-    _validate(product, order)
+    groups = named_subassemblies(product, order or ())
+    whole = with_groups(product, groups)
+    _validate(whole, order)
     setup = FixtureSetup.of(config or CellConfig())
     if cache is None:
         matrices = matrices_of(product, tolerance)
     else:
         matrices = cached_matrices(product, tolerance, cache)
-    contact, leaving = matrices.contact, matrices.interference
-    advice = advise(product, matrices, setup) if order is None else None
-    if order is not None:
-        chosen = order
-    elif product.orders:
-        chosen = product.orders[0]
-    elif advice and advice.ranked:
-        chosen = advice.ranked[0].order
+    asked = order or (product.orders[0] if product.orders else None)
+    unplanned = _unplanned(whole, asked or product.items(), matrices)
+    left_out = {item.name for item in unplanned}
+    items = tuple(name for name in product.items() if name not in left_out)
+    search = OrderSearch(whole, matrices, setup, groups)
+    if asked is None:
+        chosen, steps, stop = search.free(items)
     else:
-        chosen = fallback_order(product, matrices)
-    steps, stop = configure_fixing(product, chosen, matrices)
-    if stop and (order is not None or product.orders):
-        advice = advise(product, matrices, setup, chosen)
-    stages = (*steps, *([stop] if stop else []))
+        asked = tuple(name for name in asked if name not in left_out)
+        chosen, steps, stop = search.given(asked, () if order else items)
+    contact, leaving = matrices.contact, matrices.interference
+    stages = (*(step for built in search.built for step in built.steps), *steps, stop)
+    doubtful = stop is not None or bool(unplanned)
     return FixingPlan(
         product=product.name,
         order=chosen,
@@ -130,11 +145,30 @@ def plan(
         blockers=leaving.blockers,
         steps=steps,
         stop=stop,
-        seconds=time.perf_counter() - started - (advice.seconds if advice else 0.0),
-        evidence=evidence_of(product, matrices, stages, slanted=slanted),
-        orders=advice,
+        seconds=time.perf_counter() - started - (search.advice.seconds if search.advice else 0.0),
+        evidence=evidence_of(
+            product, matrices, [stage for stage in stages if stage], slanted=slanted
+        ),
+        orders=search.advice,
         matrices=matrices,
+        slanted=search.ways.slanted,
+        subassemblies=tuple(search.built),
+        unplanned=unplanned,
+        likely_cause=pose_doubt(list(matrices.solids.values()), contact) if doubtful else "",
     )
+
+
+def _unplanned(
+    product: Product, names: tuple[str, ...], matrices: AssemblyMatrices
+) -> tuple[Unplanned, ...]:
+    """Return the items that cannot be planned: they overlap others, or touch nothing of the rest."""
+    item_of = {part: name for name in names for part in product.members(name)}
+    mass = {name: sum(product.parts[p].mass for p in product.members(name)) for name in names}
+    errors = [(one.part, one.other, one.depth) for one in matrices.errors]
+    overlapping = overlapping_items(errors, item_of, mass)
+    refused = {item.name for item in overlapping}
+    rest = [name for name in names if name not in refused]
+    return (*overlapping, *stray_items(product, rest, matrices))
 
 
 def _validate(product: Product, order: tuple[str, ...] | None) -> None:

@@ -17,7 +17,7 @@ from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import opposite
 from planning.feasibility.freedom import Freedom, freedoms
-from planning.feasibility.matrices import AssemblyMatrices, fitted_pairs, reachable_directions
+from planning.feasibility.matrices import AssemblyMatrices, leaving_solids, reachable_directions
 from planning.feasibility.overlaps import Overlap
 from planning.feasibility.tolerance import Tolerances
 from planning.feasibility.undercut import Undercut
@@ -118,9 +118,7 @@ def evidence_of(
 def _item_freedoms(
     matrices: AssemblyMatrices, steps: Sequence[FixingStep | Stop]
 ) -> Iterator[ItemFreedom]:
-    solids = dict(matrices.solids)
-    for fitted in fitted_pairs(solids, matrices.overlaps, matrices.tolerances):
-        solids |= {solid.name: solid for solid in fitted}
+    solids = leaving_solids(matrices)
     for step in steps:
         incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
         axes = [thread.axis for thread in matrices.threads if thread.bolt in step.incoming]

@@ -1,9 +1,11 @@
-"""Slanted removal directions and local freedom: what the six directions do not cover.
+"""Local freedom of the parts of a step, and all ways out at an angle: a report for the reader.
 
-Candidate directions come from contact. Where two faces lie on each other, the incoming part cannot
-move against the target's normal there. The directions that all those normals allow form a cone; its
-edges (along two contact faces at once), the normals of its faces and the axes of threads are tried,
-first against the contact normals, then exactly against the whole shapes, as for the six.
+What a plan needs of slanted directions it finds itself (``planning.ordering.further``). This looks
+at one step more closely. Candidate directions come from contact: where two faces lie on each other,
+the incoming part cannot move against the target's normal there. The directions that all those
+normals allow form a cone; its edges (along two contact faces at once), the normals of its faces and
+the axes of threads are tried, first against the contact normals, then exactly against the whole
+shapes, as for the six.
 
 Local freedom is the distance that a part can move before it hits something: the clearance to the
 faces ahead of it, over their common projection. It is infinite only if the part leaves.
@@ -19,17 +21,16 @@ import numpy as np
 
 from planning.feasibility.blocking import decisions
 from planning.feasibility.clipping import triangle_overlaps
+from planning.feasibility.contact_normals import SAME_DIRECTION, contact_normals, distinct
 from planning.feasibility.directions import DIRECTIONS, unit_vector
 from planning.feasibility.envelope import Envelope, envelope
 from planning.feasibility.face_pairs import overlapping_faces
-from planning.feasibility.solids import Solid, boxes_apart
+from planning.feasibility.slanted import turned_to_z
+from planning.feasibility.solids import Solid
 
-OPPOSED = 0.99  # Cosine of 8 degrees: facets of a coarse cylinder on a fine one.
 ALONG = 0.01  # Sine of 0.6 degrees: sliding along a face, within its rounding.
-SAME_DIRECTION = 0.9998  # Cosine of 1 degree.
 MOST_NORMALS = 12  # Largest contact faces that candidates are made from.
 MOST_CANDIDATES = 60  # Tried exactly, those with the widest angle to the contact faces first.
-ROWS = 400_000  # Pairs of boxes compared at once: bounds the memory to some MB.
 
 
 @dataclass(frozen=True)
@@ -85,15 +86,8 @@ def freedom_along(
     incoming: Sequence[Solid], target: Sequence[Solid], direction: np.ndarray, tolerance: float
 ) -> Freedom:
     """Return how far parts can move along one direction (3,)."""
-    side = np.eye(3)[int(np.abs(direction).argmin())]
-    across = np.cross(side, direction)
-    across /= np.linalg.norm(across)
-    R = np.array([across, np.cross(direction, across), direction])  # Brings the direction to +z.
     views = [
-        [
-            envelope(Solid(s.name, s.vertices @ R.T, s.faces, s.mass, R @ s.p_AoG), axis=2)
-            for s in solids
-        ]
+        [envelope(turned_to_z(solid, direction), axis=2) for solid in solids]
         for solids in (incoming, target)
     ]
     x, y, z = (float(value) for value in direction)
@@ -122,23 +116,6 @@ def travel_along(moving: Envelope, staying: Envelope, tolerance: float) -> float
     return max(0.0, float(ahead.min())) if len(ahead) else 0.0
 
 
-def contact_normals(
-    incoming: Sequence[Solid], target: Sequence[Solid], tolerance: float
-) -> np.ndarray:
-    """Return outward normals (n, 3) of the target where the incoming parts lie on it, widest first.
-
-    Normals within a degree of each other are merged.
-    """
-    found, areas = [np.zeros((0, 3))], [np.zeros(0)]
-    for a in incoming:
-        for b in target:
-            if not boxes_apart(a, b, tolerance):
-                normals, area = _facing(a, b, tolerance)
-                found.append(normals)
-                areas.append(area)
-    return _distinct(np.concatenate(found), np.concatenate(areas))
-
-
 def candidates(normals: np.ndarray, axes: np.ndarray) -> np.ndarray:
     """Return directions (n, 3) that no contact normal forbids, other than the six.
 
@@ -156,48 +133,4 @@ def candidates(normals: np.ndarray, axes: np.ndarray) -> np.ndarray:
     allowed = (tried @ normals.T >= -ALONG).all(axis=1) if len(normals) else slanted
     tried = tried[slanted & allowed]
     clear = (tried @ normals.T).min(axis=1) if len(normals) else np.zeros(len(tried))
-    return _distinct(tried, clear)[:MOST_CANDIDATES]
-
-
-def _facing(a: Solid, b: Solid, tolerance: float) -> tuple[np.ndarray, np.ndarray]:
-    """Return b's normals where a face of a lies on a face of b, and the smaller face's area."""
-    faces = [_near_faces(solid, other, tolerance) for solid, other in ((a, b), (b, a))]
-    (corners_a, normals_a, areas_a), (corners_b, normals_b, areas_b) = faces
-    rows = max(1, ROWS // max(1, len(corners_b)))
-    found, areas = [np.zeros((0, 3))], [np.zeros(0)]
-    low_b, high_b = corners_b.min(axis=1), corners_b.max(axis=1)
-    for first in range(0, len(corners_a), rows):
-        part = corners_a[first : first + rows]
-        meet = normals_a[first : first + rows] @ normals_b.T < -OPPOSED
-        for k in range(3):
-            meet &= part[:, :, k].min(axis=1)[:, None] <= high_b[None, :, k] + tolerance
-            meet &= part[:, :, k].max(axis=1)[:, None] >= low_b[None, :, k] - tolerance
-        row, column = np.nonzero(meet)
-        offset = part[row].mean(axis=1) - corners_b[column].mean(axis=1)
-        close = np.abs((offset * normals_b[column]).sum(axis=1)) <= tolerance
-        found.append(normals_b[column[close]])
-        areas.append(np.minimum(areas_a[first + row[close]], areas_b[column[close]]))
-    return np.concatenate(found), np.concatenate(areas)
-
-
-def _near_faces(
-    solid: Solid, other: Solid, tolerance: float
-) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Return corners (m, 3, 3), normals and areas of the faces near another part's box."""
-    corners = solid.vertices[solid.faces]
-    near = np.all(corners.min(axis=1) <= other.upper + tolerance, axis=1)
-    near &= np.all(corners.max(axis=1) >= other.lower - tolerance, axis=1)
-    corners = corners[near]
-    doubled = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    lengths = np.linalg.norm(doubled, axis=1)
-    kept = lengths > 0.0
-    return corners[kept], doubled[kept] / lengths[kept, None], lengths[kept] / 2.0
-
-
-def _distinct(directions: np.ndarray, weights: np.ndarray) -> np.ndarray:
-    """Return unit vectors without near repetitions, heaviest first."""
-    kept = np.zeros((0, 3))
-    for direction in directions[np.argsort(-weights, kind="stable")]:
-        if not len(kept) or (kept @ direction).max() < SAME_DIRECTION:
-            kept = np.vstack([kept, direction])
-    return kept
+    return distinct(tried, clear)[0][:MOST_CANDIDATES]

@@ -97,7 +97,7 @@ def interference(
                 blocked = decision.point is not None
                 margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
                 free[forward][i, k] = free[opposite(forward)][k, i] = int(not blocked)
-            for hit in _evidence(views, forward, decided, float(level)):
+            for hit in evidence_of_hits(views, forward, decided, float(level)):
                 blockers += [hit, hit.reversed()]
     return Interference(free, tuple(blockers), margin)
 
@@ -115,16 +115,23 @@ def first_hit(
     """
     views = [moving, staying]
     decided = {parts: d for parts, d in decisions(views, tolerance).items() if parts == (0, 1)}
-    return next(_evidence(views, direction, decided, tolerance), None)
+    return next(evidence_of_hits(views, direction, decided, tolerance), None)
 
 
-def _evidence(
+def evidence_of_hits(
     views: Sequence[Envelope],
     direction: str,
     decided: Mapping[tuple[int, int], Decision],
     tolerance: float,
 ) -> Iterator[Blocker]:
-    """Yield the point that is hit, for each pair that is blocked."""
+    """Yield the point that is hit, for each pair that is blocked.
+
+    Args:
+        views: The parts' envelopes along one axis.
+        direction: "+x", "+y" or "+z".
+        decided: What ``decisions`` returned for them.
+        tolerance: Overlap that does not count [m].
+    """
     points = {parts: d.point for parts, d in decided.items() if d.point is not None}
     seen = list(PLANE[axis_index(direction)])
     floors = _heights([view.up for view in views], points, 0)

@@ -146,6 +146,14 @@ def fitted_pairs(
             yield fitted_pair(solids[one.part], solids[one.other], tolerance)
 
 
+def leaving_solids(matrices: AssemblyMatrices) -> dict[str, Solid]:
+    """Return the parts as what leaves them sees them, without overlaps that are meant."""
+    solids = dict(matrices.solids)
+    for pair in fitted_pairs(solids, matrices.overlaps, matrices.tolerances):
+        solids |= {solid.name: solid for solid in pair}
+    return solids
+
+
 def _redecided(
     leaving: Interference,
     names: Sequence[str],

@@ -5,14 +5,19 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
+import numpy as np
+
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.fixtures.soft_jig import JigParameters
 from cell.machines.grippers import GRIPPER_MODELS
-from planning.feasibility.directions import axis_index
+from planning.feasibility.directions import axis_index, unit_vector
+
+STEEP = 0.7071  # Sine of 45 degrees, rounded down: what comes at 45 degrees comes from above.
+LEVEL = 1e-3  # Sine of 0.06 degrees: horizontal within rounding.
 
 CRITERIA: Mapping[str, str] = {
-    "reach": "1 if the moved part comes from above, 1/2 from the side",
+    "reach": "1 if the moved part comes from above, 1/2 from the side, between them at an angle",
     "stability": "angle by which the centre of gravity can tilt before it leaves the support area, "
     "of 90 degrees; the lower of the body alone and with the moved part on it",
     "footprint": "share of the bag's diameter that the footprint leaves free",
@@ -76,6 +81,8 @@ class Proposal:
         up: Axis of the product frame that points up.
         held: Whether the jig already holds this body in this posture.
         empty: Whether the jig holds nothing yet.
+        slanted: The same at an angle to the axes, (3,) unit vectors in A; they count only where
+            none of the directions is open.
     """
 
     name: str
@@ -85,6 +92,7 @@ class Proposal:
     up: str
     held: bool
     empty: bool
+    slanted: Sequence[tuple[float, float, float]] = ()
 
     @property
     def sideways(self) -> list[str]:
@@ -92,11 +100,32 @@ class Proposal:
         return [j for j in self.directions if axis_index(j) != axis_index(self.up)]
 
     @property
+    def steepest(self) -> tuple[float, float, float] | None:
+        """The slanted direction that is nearest to ``up``, if only slanted ones are open."""
+        if self.directions or not self.slanted:
+            return None
+        return max(self.slanted, key=self._rise)
+
+    @property
+    def rise(self) -> float:
+        """Sine of the angle above the horizontal at which the moved parts come: 1 from above."""
+        if self.steepest is not None:
+            return self._rise(self.steepest)
+        return 1.0 if self.up in self.directions else 0.0 if self.sideways else -1.0
+
+    @property
     def approach(self) -> str:
-        """Where the moved parts come from: "above" if possible, else "the side", else "below"."""
-        if self.up in self.directions:
+        """Where the moved parts come from: "above" if possible, else "the side", else "below".
+
+        What comes at an angle comes from above if it is steeper than 45 degrees, and from the side
+        down to the horizontal.
+        """
+        if self.rise >= STEEP:
             return "above"
-        return "the side" if self.sideways else "below"
+        return "the side" if self.rise >= -LEVEL else "below"
+
+    def _rise(self, way: tuple[float, float, float]) -> float:
+        return float(np.dot(way, unit_vector(self.up)))
 
 
 @dataclass(frozen=True)

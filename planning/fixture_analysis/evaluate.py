@@ -131,7 +131,7 @@ class _Evaluation:
         margin = self._holding_margin(imprint)
         bag = self.setup.jig.bag
         return {
-            "reach": 1.0 if approach == "above" else 0.5,
+            "reach": (1.0 + max(0.0, self.proposal.rise)) / 2.0,
             "stability": tilt / (np.pi / 2),
             "footprint": 1.0 - diameter / (2 * bag.aperture_radius),
             "imprint": 1.0 - imprint.depth / (bag.cap_height - bag.floor),
@@ -213,7 +213,7 @@ class _Evaluation:
             depth = depth_in_bed(imprint, surface, self.R_JA, self.p_middle, self.low)
             if depth <= BED_YIELDS:
                 continue
-            if self.proposal.approach != "above" or depth > self._engagement(name):
+            if self.proposal.rise < 1.0 or depth > self._engagement(name):
                 raise Rejected(f"{name} would end {1e3 * depth:.0f} mm inside the frozen bed")
             protruding[name] = depth
         if protruding:

@@ -65,6 +65,14 @@ def operation_load(
     torque = max((f.torque for f in screws), default=0.0) if driven else 0.0
     p_JQ = R_JA @ mating_point(product, solids, proposal, piece)
     p_Q, height = p_JQ[:2] - p_middle, max(float(p_JQ[2]) - low, 1e-3)
+    if proposal.steepest is not None:
+        way = R_JA @ np.array(proposal.steepest)
+        level = float(np.linalg.norm(way[:2]))
+        push = -way[:2] / max(level, 1e-9)
+        # Friction beside the hole acts on top of the force's own horizontal share, at worst along.
+        sideways = force * (level + FIT_FRICTION * max(0.0, float(way[2])))
+        down = force * max(0.0, float(way[2]))
+        return OperationLoad(down, sideways, torque, p_Q, height, (push,))
     if proposal.approach == "above":
         return OperationLoad(force, FIT_FRICTION * force, torque, p_Q, height)
     along = [-(R_JA @ unit_vector(j))[:2] for j in proposal.sideways]

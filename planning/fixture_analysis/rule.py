@@ -14,6 +14,8 @@ from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
+import numpy as np
+
 from cell.products.product import Product
 from planning.feasibility.algorithm import FixingStep
 from planning.feasibility.directions import DIRECTIONS, open_directions, opposite
@@ -54,6 +56,7 @@ def _ranked(evaluator: Evaluator, step: FixingStep, assembled: tuple[str, ...]) 
     empty, target_name = len(assembled) == 1, subassembly_name(assembled)
     leaving = open_directions(step.directions)
     arriving = [opposite(j) for j in leaving]
+    slanted = [np.array(way) for way in step.slanted]
     proposals = [
         Proposal(
             name,
@@ -63,10 +66,11 @@ def _ranked(evaluator: Evaluator, step: FixingStep, assembled: tuple[str, ...]) 
             up,
             held=not empty and name == target_name and up == step.up,
             empty=empty,
+            slanted=[tuple(sign * way) for way in slanted],
         )
-        for name, body, moved, directions in (
-            (target_name, step.target, step.incoming, leaving),
-            (step.item, step.incoming, step.target, arriving),
+        for name, body, moved, directions, sign in (
+            (target_name, step.target, step.incoming, leaving, 1.0),
+            (step.item, step.incoming, step.target, arriving, -1.0),
         )
         for up in DIRECTIONS
     ]

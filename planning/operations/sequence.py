@@ -12,6 +12,7 @@ from dataclasses import dataclass, field
 from cell.products.product import Product
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import FixingStep
+from planning.feasibility.slanted import direction_label
 from planning.operations.operation import NoOperation, Role, Scene, Step
 from planning.operations.registry import OPERATIONS
 
@@ -22,6 +23,15 @@ def steps(product: Product, plan: FixingPlan) -> list[Step]:
     Raises:
         NoOperation: No operation makes a joint that is asked for, or fixes what is to be fixed.
     """
+    if plan.subassemblies:
+        names = ", ".join(built.name for built in plan.subassemblies)
+        raise NoOperation(f"The plan builds {names} first; no operation builds a sub-assembly.")
+    for planned in plan.steps:
+        if not any(planned.directions.values()):
+            way = direction_label(planned.leaves_along)
+            raise NoOperation(
+                f"{planned.item} is added along {way}; no operation comes at an angle."
+            )
     sequence = _Sequence(Scene(product))
     for planned in plan.steps:
         sequence.add(planned)

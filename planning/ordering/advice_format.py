@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
-from planning.ordering.advice import OrderAdvice, RankedOrder
+from planning.ordering.advice import Built, OrderAdvice, RankedOrder
 from planning.ordering.precedence import Precedence
 from planning.ordering.separation import Interlock
 
@@ -26,7 +26,14 @@ def advice_text(advice: OrderAdvice) -> str:
         claim = "proved: there is no better one"
     elif best.unstable_stages == best.refixings == 0:
         claim = "none is more stable or has fewer re-fixings; the lowest found"
-    lines = [f"Best orders ({claim}): {OBJECTIVE}."]
+    lines = [
+        f"Built first, as one item: {built.name}, in the order {','.join(built.order)}."
+        for built in advice.subassemblies
+    ]
+    if advice.interlock:
+        listed = ", ".join(advice.interlock.items)
+        lines.insert(0, f"No order of single items is feasible: {listed} lock each other.")
+    lines.append(f"Best orders ({claim}): {OBJECTIVE}.")
     for number, ranked in enumerate(advice.ranked, start=1):
         unstable = f", {ranked.unstable_stages} unstable stages" if ranked.unstable_stages else ""
         lines.append(
@@ -47,7 +54,9 @@ def precedence_text(advice: OrderAdvice) -> str:
     first = advice.ranked[0].order[0]
     if not advice.precedence:
         return f"Precedence, beginning with {first}: none."
-    lines = [f"Precedence, in every order that begins with {first}:"]
+    using = " and contains these sub-assemblies" if advice.subassemblies else ""
+    along = ", along the six directions and those slanted ones" if advice.slanted else ""
+    lines = [f"Precedence, in every order that begins with {first}{using}{along}:"]
     lines += [f"  {constraint_text(constraint)}" for constraint in advice.precedence]
     return "\n".join(lines)
 
@@ -98,9 +107,15 @@ def advice_from_dict(data: Mapping[str, Any]) -> OrderAdvice:
             tuple(interlock["subassembly"]),
             interlock["direction"],
             tuple(interlock["stuck"]),
+            interlock["slanted"],
         )
         if interlock
         else None,
         data["reason"],
         data["seconds"],
+        tuple(
+            Built(built["name"], tuple(built["parts"]), tuple(built["order"]))
+            for built in data["subassemblies"]
+        ),
+        data["slanted"],
     )

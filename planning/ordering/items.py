@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from planning.feasibility.directions import DIRECTIONS
-
 
 @dataclass(frozen=True)
 class Items:
@@ -22,7 +20,8 @@ class Items:
     Attributes:
         names: Items of the order: groups, and parts outside any group.
         touching: Per item, the set of items that it touches.
-        hits: Per direction and item, the set of items it hits when it moves along it to infinity.
+        hits: Per direction and item, the set of items it hits when it moves along it to infinity:
+            the six, then slanted ones by their labels.
         whole: Per item, whether its parts are connected: loose bolts cannot be held as one body.
         kinds: Per item a number, equal for items of the same shape and mass.
     """
@@ -40,11 +39,11 @@ class Items:
 
     def directions(self, item: int, rest: int) -> list[str]:
         """Return the directions along which an item leaves the rest of a set."""
-        return [j for j in DIRECTIONS if not self.hits[j][item] & rest]
+        return [j for j, hits in self.hits.items() if not hits[item] & rest]
 
     def leaves(self, item: int, rest: int) -> bool:
         """Return whether an item leaves the rest of a set along any direction."""
-        return any(not self.hits[j][item] & rest for j in DIRECTIONS)
+        return any(not hits[item] & rest for hits in self.hits.values())
 
     def connected(self, items: int) -> bool:
         """Return whether a set is connected by contacts."""
@@ -96,7 +95,7 @@ def items_of(
         names: Of the items.
         parts: Per item the matrix indices of its parts.
         contact: (n, n) strictly upper triangular C.
-        free: Per direction the (n, n) matrix M_j.
+        free: Per direction, by label, the (n, n) matrix M_j.
         kinds: Per item a number, equal for items of the same shape; () if all differ.
     """
     touches = (contact + contact.T).astype(bool)
@@ -106,7 +105,7 @@ def items_of(
     return Items(
         tuple(names),
         _rows(member, touches),
-        {j: _rows(member, free[j] == 0) for j in DIRECTIONS},
+        {j: _rows(member, matrix == 0) for j, matrix in free.items()},
         tuple(
             connected_components(touches[np.ix_(indices, indices)], directed=False)[0] == 1
             for indices in map(list, parts)

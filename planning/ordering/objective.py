@@ -19,8 +19,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from planning.feasibility.algorithm import choose_posture
-from planning.feasibility.directions import opposite, rotation_with_up
+from planning.feasibility.algorithm import choose_posture, open_postures
+from planning.feasibility.directions import DIRECTIONS, opposite, rotation_with_up
+from planning.feasibility.slanted import Slanted
 from planning.feasibility.solids import Solid
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.fixture_analysis.footprint import (
@@ -35,6 +36,9 @@ from planning.ordering.search import Cost
 
 # [m] Heights are summed as whole micrometres: sums do not depend on the order of summation.
 HEIGHT_UNIT = 1e-6
+# [M] Imprints computed at most where slanted directions are in use, 50 ms each: all stages of a
+# product drawn at an angle stand on an edge. Beyond them, what has no footprint counts as unstable.
+MOST_IMPRINTS = 40
 ROUNDING = 1e-10  # [m] Keeps rounding errors from deciding heights half-way between two units.
 
 
@@ -48,6 +52,7 @@ class Objective:
         parts: Per item the names of its parts.
         up: Axis of the product frame that points up on the jig.
         setup: For the jig, and the force with which a part is pressed into it.
+        slanted: Slanted directions, which the items know by their labels.
     """
 
     items: Items
@@ -55,6 +60,7 @@ class Objective:
     parts: Sequence[Sequence[str]]
     up: str
     setup: FixtureSetup
+    slanted: Sequence[Slanted] = ()
     _stages: dict[int, tuple[int, int]] = field(default_factory=dict)
     _outlines: dict[int, Footprint | None] = field(default_factory=dict)
     _bearing: dict[int, Footprint | None] = field(default_factory=dict)
@@ -79,7 +85,9 @@ class Objective:
     def refixes(self, rest: int, item: int) -> bool:
         """Return whether Algorithm 1 fixes the item instead of the set it is added to."""
         against = opposite(self.up)
-        directions = self.items.directions(item, rest)
+        ways = self.items.directions(item, rest)
+        slanted = [way.direction for way in self.slanted if way.label in ways]
+        directions = open_postures((j for j in ways if j in DIRECTIONS), slanted, self.up)
         if against not in directions:
             return False
         if self.up not in directions:
@@ -118,6 +126,8 @@ class Objective:
         cap_height = self.setup.jig.bag.cap_height
         reaching = as_set(i for i in numbers if self._low[i] <= low + cap_height)
         if reaching not in self._bearing:
+            if self.slanted and len(self._bearing) >= MOST_IMPRINTS:
+                return False
             self._bearing[reaching] = self._bearing_outline(reaching)
         outline = self._bearing[reaching]
         return outline is not None and outline.margin(cog) > 0.0

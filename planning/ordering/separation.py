@@ -11,8 +11,10 @@ blocking graph (Wilson and Latombe), with an edge from each item to those it hit
 sub-assembly exists if and only if the graph is not strongly connected. The graph along -j is that
 along +j with its edges reversed: three axes suffice.
 
-Considered are single straight translations along the six directions to infinity: no rotations, no
-paths with turns. Contact is not required: it could only forbid more.
+Considered are single straight translations to infinity: along the six directions, and along those
+slanted ones that the items' contacts suggested and that were tried (``further``). No rotations, no
+paths with turns; a thread counts as a straight way along its axis. So what is proved is proved of
+these motions. Contact is not required: it could only forbid more.
 """
 
 from __future__ import annotations
@@ -35,22 +37,25 @@ class Interlock:
         direction: Along which it does, or "".
         stuck: Names of items that cannot be assembled from sub-assemblies either; none if the whole
             product can.
+        slanted: Number of slanted directions that were tried beside the six.
     """
 
     items: tuple[str, ...]
     subassembly: tuple[str, ...]
     direction: str
     stuck: tuple[str, ...]
+    slanted: int = 0
 
 
-def locked_core(items: Items, kept: int = 0) -> int:
+def locked_core(items: Items, kept: int = 0, within: int | None = None) -> int:
     """Remove single items until none leaves; return the set that remains.
 
     Args:
         items: The items.
         kept: Set of items that are not removed.
+        within: Set to begin with; None for all.
     """
-    core, before = items.everything, 0
+    core, before = items.everything if within is None else within, 0
     while core != before:
         before = core
         for i in members(before & ~kept):
@@ -59,14 +64,20 @@ def locked_core(items: Items, kept: int = 0) -> int:
     return core
 
 
-def find_interlock(items: Items) -> Interlock | None:
-    """Return why no order of single items exists, or None if blocking does not rule it out."""
+def find_interlock(items: Items, slanted: int = 0) -> Interlock | None:
+    """Return why no order of single items exists, or None if blocking does not rule it out.
+
+    Args:
+        items: With all directions that free something.
+        slanted: Number of slanted directions that were tried to find those.
+    """
     core = locked_core(items)
     if not core & (core - 1):
         return None
     moving, direction = split(items, core)
     stuck = inseparable(items, core)
-    return Interlock(items.listed(core), items.listed(moving), direction, items.listed(stuck))
+    moved, left = items.listed(moving), items.listed(stuck)
+    return Interlock(items.listed(core), moved, direction, left, slanted)
 
 
 def split(items: Items, core: int) -> tuple[int, str]:
