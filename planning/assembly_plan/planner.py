@@ -161,7 +161,7 @@ def plan(
 def _unplanned(
     product: Product, names: tuple[str, ...], matrices: AssemblyMatrices
 ) -> tuple[Unplanned, ...]:
-    """Return the items that cannot be planned: they overlap others, or touch nothing of the rest."""
+    """Return the items that cannot be planned: they overlap others, or touch none of the rest."""
     item_of = {part: name for name in names for part in product.members(name)}
     mass = {name: sum(product.parts[p].mass for p in product.members(name)) for name in names}
     errors = [(one.part, one.other, one.depth) for one in matrices.errors]

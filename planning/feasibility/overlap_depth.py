@@ -79,8 +79,12 @@ def _deepest(piece: manifold3d.Manifold, a: Solid, b: Solid) -> Iterator[tuple[f
     middles = []
     for face in widest[:: 1 + len(widest) // CHORDS]:
         start, inward = corners[face].mean(axis=0), -doubled[face] / areas[face]
-        hits = piece.ray_cast(start + 1e-6 * size * inward, start + 2.0 * size * inward)
-        middles += [(start + np.array(hits[0].position)) / 2.0] if hits else []
+        # From outside, so that the far side of a film is met before what lies beyond it.
+        hits = piece.ray_cast(start - 1e-3 * size * inward, start + 2.0 * size * inward)
+        places = [np.array(hit.position) for hit in hits]
+        entry = next((n for n, at in enumerate(places) if (at - start) @ inward > -FILM), None)
+        if entry is not None and entry + 1 < len(places):
+            middles.append((places[entry] + places[entry + 1]) / 2.0)
     if middles:
         radius, centre = _furthest(np.array(middles), surface_of(corners))
         yield 2.0 * radius, centre
