@@ -31,6 +31,7 @@ from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
 from experiments.reporting.render import rendering_problem
 from planning import plan
+from planning.assembly_plan.verdict import verdict_of
 from planning.feasibility.bolt_remark import bolt_remarks
 from planning.feasibility.directions import DIRECTIONS
 from planning.fixture_analysis.candidate import FixtureSetup
@@ -50,7 +51,7 @@ def write(product: Product, file: Path, order: tuple[str, ...] | None = None) ->
     fixing = plan(product, order)
     assert fixing.matrices is not None
     ranking = general_rule(product, fixing.order, fixing.steps, fixing.matrices, SETUP)
-    write_page(file, product, fixing, ranking, SETUP, ["a <note>"])
+    write_page(file, product, fixing, ranking, verdict_of(fixing, ranking), SETUP, ["a <note>"])
     return file.read_text()
 
 

@@ -333,7 +333,7 @@ def test_plan_file_keeps_its_six_keys_and_adds_the_slanted(tmp_path):
     assert way["free"] == way["reachable"] == [[0, 0], [1, 0]]
     after = load_plan(tmp_path / "plan.json")
     assert plan_to_dict(after) == plan_to_dict(fixing) and after.steps == fixing.steps
-    assert "(0.588, 0, 0.809)" in step_texts(fixing)[0]
+    assert "(0.588, 0, 0.809)" in step_texts(fixing.lines[0])[0]
 
 
 def test_the_general_rule_knows_what_comes_at_an_angle():

@@ -14,7 +14,7 @@ from cell.products.product import Product
 from experiments.plan.drawn import Body, DrawnProduct, Shape, box
 from experiments.plan.scene import Color, SceneItem
 from planning.feasibility.algorithm import FixingStep
-from planning.feasibility.directions import opposite, rotation_with_up, unit_vector
+from planning.feasibility.directions import opposite, rotation_with_up
 
 MOVED: Color = (0.93, 0.52, 0.13)
 ARROW: Color = (0.80, 0.10, 0.12)
@@ -46,9 +46,8 @@ def step_arrangement(
     turned = {n: _turned(drawn, n, step.up) for n in (*step.target, *step.incoming)}
     below = step.incoming if step.posture == opposite(step.up) else step.target
     moved = step.target if below is step.incoming else step.incoming
-    leaving = rotation_with_up(step.up) @ unit_vector(
-        step.posture if moved is step.incoming else opposite(step.posture)
-    )
+    sign = 1.0 if moved is step.incoming else -1.0
+    leaving = sign * rotation_with_up(step.up).matrix() @ np.array(step.leaves_along)
     low, high = box(turned[name] for name in below)
     middle = (low + high) / 2
     to_bag = np.array([-middle[0], -middle[1], bag.cap_height - depth - low[2]])
@@ -66,7 +65,7 @@ def exploded(drawn: DrawnProduct, steps: Sequence[FixingStep]) -> list[SceneItem
     names = [*assembled, *(name for step in steps for name in step.incoming)]
     turned = {name: _turned(drawn, name, steps[0].up) for name in names}
     for step in steps:
-        leaving = rotation_with_up(step.up) @ unit_vector(step.posture)
+        leaving = rotation_with_up(step.up).matrix() @ np.array(step.leaves_along)
         moved = [turned[name] for name in step.incoming]
         distance = _separation(moved, [turned[name] for name in assembled], leaving)
         turned |= {name: turned[name].moved(distance * leaving) for name in step.incoming}
@@ -81,10 +80,10 @@ def _turned(drawn: DrawnProduct, name: str, up: str) -> Body:
 
 def _separation(moved: Sequence[Body], staying: Sequence[Body], along: np.ndarray) -> float:
     """Return the distance to move along a direction until there is a gap [m]."""
-    (low, high), (low_there, high_there) = box(moved), box(staying)
-    axis, forward = int(np.argmax(np.abs(along))), along.sum() > 0
-    overlap = high_there[axis] - low[axis] if forward else high[axis] - low_there[axis]
-    return max(0.0, float(overlap)) + GAP * float(np.linalg.norm(high - low))
+    end = max(float((body.vertices @ along).max()) for body in staying)
+    start = min(float((body.vertices @ along).min()) for body in moved)
+    low, high = box(moved)
+    return max(0.0, end - start) + GAP * float(np.linalg.norm(high - low))
 
 
 def _parts(product: Product, turned: Mapping[str, Body], moved: Sequence[str]) -> list[SceneItem]:

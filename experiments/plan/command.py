@@ -24,16 +24,12 @@ from planning.assembly_plan.explain import (
 )
 from planning.assembly_plan.plan_file import save_plan
 from planning.assembly_plan.planner import FixingPlan, plan
+from planning.assembly_plan.verdict import verdict_of
 from planning.feasibility.bolt_remark import bolt_remarks
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence_format import evidence_text
 from planning.fixture_analysis.candidate import Choice, FixtureSetup
-from planning.fixture_analysis.rule import (
-    choices_text,
-    choices_to_list,
-    general_rule,
-    unheld_text,
-)
+from planning.fixture_analysis.rule import choices_text, choices_to_list, general_rule
 from planning.ordering.advice_format import advice_text
 
 
@@ -90,7 +86,12 @@ def run_plan(
     _print_plan(console, fixing, explain)
     setup, started = FixtureSetup.of(config), time.perf_counter()
     with console.status("Candidates of the general rule ..."):
-        choices = general_rule(described, fixing.order, fixing.steps, fixing.matrices, setup)
+        choices = tuple(
+            choice
+            for line in fixing.lines
+            for choice in general_rule(described, line.order, line.steps, fixing.matrices, setup)
+        )
+    verdict = verdict_of(fixing, choices)
     seconds = {"general rule": time.perf_counter() - started}
     remarks = [remark.text() for remark in bolt_remarks(described, fixing.matrices.solids)]
     out.mkdir(parents=True, exist_ok=True)
@@ -100,14 +101,15 @@ def run_plan(
     save_matrices(fixing, out / "matrices.npz")
     if html:
         with console.status(f"Pictures for {page.name} ..."):
-            seconds[page.name] = write_page(page, described, fixing, choices, setup, remarks)
+            seconds[page.name] = write_page(
+                page, described, fixing, choices, verdict, setup, remarks
+            )
     _print_rule(console, choices, explain, remarks)
     if fixing.orders:
         seconds = {"orders": fixing.orders.seconds} | seconds
     further = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
-    lines = [f"Planned in {fixing.seconds:.2f} s; {further}."]
-    lines += [unheld_text(choices)] if fixing.feasible and unheld_text(choices) else []
-    _print_lines(console, lines)
+    timing = f"Planned in {fixing.seconds:.2f} s; {further}."
+    _print_lines(console, [timing, f"Verdict: {verdict.text}."])
     return 0 if fixing.feasible else 1
 
 
@@ -124,9 +126,11 @@ def save_matrices(fixing: FixingPlan, file: Path) -> None:
 
 
 def _print_plan(console: Console, fixing: FixingPlan, explain: bool) -> None:
-    console.print(step_table(fixing))
-    lines = [explanation(fixing)] if explain else step_texts(fixing)
-    lines += [stop_text(fixing)] if fixing.stop else []
+    for line in fixing.lines:
+        console.print(step_table(line))
+        _print_lines(console, [] if explain else step_texts(line))
+    lines = [explanation(fixing)] if explain else []
+    lines += [text for text in [stop_text(fixing)] if text]
     lines += [overlap_text(fixing)] if fixing.overlaps else []
     lines += [advice_text(fixing.orders)] if fixing.orders else []
     lines += [evidence_text(fixing.evidence)] if fixing.evidence else []

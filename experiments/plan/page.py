@@ -16,14 +16,15 @@ from experiments.reporting.html_page import page, pairs, section, table
 from experiments.reporting.output import write_text
 from experiments.reporting.render import rendering_problem
 from planning.assembly_plan.explain import blocker_text, overlap_text, step_texts, stop_text
+from planning.assembly_plan.order_search import AssemblyLine
 from planning.assembly_plan.planner import FixingPlan
+from planning.assembly_plan.verdict import Verdict
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import opposite
 from planning.feasibility.evidence_format import evidence_text
 from planning.feasibility.order import subassembly_name
 from planning.fixture_analysis.candidate import CRITERIA, Choice, FixtureSetup
 from planning.fixture_analysis.footprint import USUAL_DEPTH
-from planning.fixture_analysis.rule import unheld_text
 from planning.ordering.advice import OrderAdvice
 from planning.ordering.advice_format import advice_text, constraint_text
 
@@ -36,6 +37,7 @@ def write_page(
     product: Product,
     plan: FixingPlan,
     choices: Sequence[Choice],
+    verdict: Verdict,
     setup: FixtureSetup,
     notes: Sequence[str] = (),
 ) -> float:
@@ -45,7 +47,8 @@ def write_page(
         path: The HTML file; it appears whole or not at all.
         product: What was planned.
         plan: Its plan.
-        choices: The general rule's ranking, per step.
+        choices: The general rule's ranking, per step of its lines.
+        verdict: On the plan.
         setup: The cell's jig.
         notes: Further remarks for the reader.
     """
@@ -59,7 +62,7 @@ def write_page(
         apart = _figure(shown, "Each item moved out against its mating direction")
     missing = [f"No pictures: {problem}."] if problem else []
     sections = [
-        _summary(plan, unheld_text(choices), [*notes, *missing]),
+        _summary(plan, verdict, [*notes, *missing]),
         section("Orders", _orders(plan.orders)),
         section("Steps", _steps(drawn, plan, choices, setup)),
         section("Exploded view", apart),
@@ -72,22 +75,22 @@ def write_page(
     return time.perf_counter() - started
 
 
-def _summary(plan: FixingPlan, unheld: str, notes: Sequence[str]) -> str:
+def _summary(plan: FixingPlan, verdict: Verdict, notes: Sequence[str]) -> str:
     facts = {
         "order": ", ".join(plan.order),
         "parts": f"{len(plan.parts)}",
         "up on the jig": plan.steps[0].up if plan.steps else "",
         "planned in": f"{plan.seconds:.3f} s",
     }
-    verdict, words = "failure", "infeasible"
-    if plan.feasible:
-        verdict, words = ("warning", "feasible by geometry") if unheld else ("success", "feasible")
-    reasons = "\n".join(filter(None, [stop_text(plan), overlap_text(plan), unheld]))
+    words, _, why = verdict.text.partition(":" if not verdict.good else ";")
+    kind = "failure" if not verdict.feasible else "success" if verdict.held else "warning"
+    evidence = [stop_text(plan), overlap_text(plan)]
+    reasons = "\n".join(filter(None, [why.strip() if verdict.feasible else "", *evidence]))
     stop = f"<pre>{escape(reasons)}</pre>" if reasons else ""
     paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
     return (
         f"<h1>{escape(plan.product)}: plan</h1>\n"
-        f'<p><span class="verdict {verdict}">{words}</span></p>\n{stop}{paragraphs}{pairs(facts)}'
+        f'<p><span class="verdict {kind}">{escape(words)}</span></p>\n{stop}{paragraphs}{pairs(facts)}'
     )
 
 
@@ -108,30 +111,34 @@ def _steps(
 ) -> str:
     scores = f"<details><summary>What the scores mean</summary>{pairs(CRITERIA)}</details>"
     parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
-    reasons = step_texts(plan)
-    for number, step in enumerate(plan.steps):
-        choice = choices[number] if number < len(choices) else None
-        parts.append(f"<h3>{number + 1}. {escape(step.item)}</h3>")
-        if drawn and number < MOST_STEPS_PICTURED:
-            parts.append(_picture(drawn, plan, number, choice, setup))
-        parts.append(
-            f"<p><b>Algorithm 1: {escape(step.posture)} / {escape(step.fixed_part)}.</b> "
-            f"{escape(reasons[number].strip())}</p>"
-        )
-        parts.append(_choice(choice) if choice else "")
-    if drawn and len(plan.steps) > MOST_STEPS_PICTURED:
+    built = {line.name for line in plan.subassemblies}
+    waiting, pictured = iter(choices), 0
+    for line in plan.lines:
+        parts.append(f"<h3>Sub-assembly {escape(line.name)}</h3>" if line.name in built else "")
+        for number, (step, reason) in enumerate(zip(line.steps, step_texts(line), strict=True)):
+            choice = next(waiting, None)
+            parts.append(f"<h3>{number + 1}. {escape(step.item)}</h3>")
+            if drawn and pictured < MOST_STEPS_PICTURED:
+                parts.append(_picture(drawn, line, number, choice, setup))
+                pictured += 1
+            parts.append(
+                f"<p><b>Algorithm 1: {escape(step.posture)} / {escape(step.fixed_part)}.</b> "
+                f"{escape(reason.strip())}</p>"
+            )
+            parts.append(_choice(choice) if choice else "")
+    if drawn and pictured == MOST_STEPS_PICTURED:
         parts.append(f"<p>The first {MOST_STEPS_PICTURED} steps are pictured.</p>")
     return "\n".join(parts) if plan.steps else ""
 
 
 def _picture(
-    drawn: DrawnProduct, plan: FixingPlan, number: int, choice: Choice | None, setup: FixtureSetup
+    drawn: DrawnProduct, line: AssemblyLine, number: int, choice: Choice | None, setup: FixtureSetup
 ) -> str:
-    step = plan.steps[number]
+    step = line.steps[number]
     figured = choice.candidates[choice.paper].figures if choice else {}
     depth = figured.get("depth_m", USUAL_DEPTH)
     shown = step_arrangement(drawn, step, setup.jig.bag, depth)
-    sides = [step.item, subassembly_name(plan.order[: number + 1])]
+    sides = [step.item, subassembly_name(line.order[: number + 1])]
     moved, held = sides[::-1] if step.posture == opposite(step.up) else sides
     return _figure(shown, f"Step {number + 1}: {moved} onto {held}, {step.up} up")
 

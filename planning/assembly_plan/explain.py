@@ -8,6 +8,7 @@ import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
+from planning.assembly_plan.order_search import AssemblyLine
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING
 from planning.feasibility.directions import DIRECTIONS, open_directions
@@ -20,23 +21,25 @@ from planning.ordering.advice_format import precedence_text
 MOST_LISTED = 20  # Overlaps; the file holds all.
 
 
-def step_table(plan: FixingPlan) -> Table:
+def step_table(line: AssemblyLine) -> Table:
     """Return a table of the steps: incoming item, A by direction, posture, fixed part and CoG.
 
     Names are folded where the terminal is too narrow for them; 80 columns do.
     """
-    title = f"{plan.product}: {', '.join(plan.order)}"
-    if plan.steps:
-        title += f"; {plan.steps[0].up} up"
+    title = f"{line.name}: {', '.join(line.order)}"
+    if line.steps:
+        title += f"; {line.steps[0].up} up"
     table = Table(title=escape(title), title_justify="left")
     table.add_column("", justify="right")
     table.add_column("incoming", overflow="fold")
     table.add_column(" ".join(DIRECTIONS), no_wrap=True)
     table.add_column("posture / fixed", overflow="fold")
     table.add_column(escape("CoG [mm]"), justify="right", no_wrap=True)
-    for number, step in enumerate(plan.steps, start=1):
+    for number, step in enumerate(line.steps, start=1):
         digits = "  ".join(f"{step.directions[j]:>1}" for j in DIRECTIONS)
         chosen = f"{step.posture} / {step.fixed_part}"
+        if step.slanted:
+            chosen += f", along {direction_label(step.leaves_along)}"
         height = f"{1e3 * step.cog_height:.1f}"
         table.add_row(str(number), escape(step.item), f" {digits}", escape(chosen), height)
     return table
@@ -96,7 +99,7 @@ def explanation(plan: FixingPlan) -> str:
         "Reachable W_j = (C + C^T) * M_j",
         *(f"W_{j}:\n" + matrix_text(plan.parts, plan.reachable[j]) for j in DIRECTIONS),
         *([precedence_text(plan.orders)] if plan.orders and plan.orders.ranked else []),
-        "Steps:\n" + "\n".join(step_texts(plan)),
+        "Steps:\n" + "\n".join(text for line in plan.lines for text in step_texts(line)),
         "Reading: " + READING,
         "Blocked, with a point of the stationary part, in the product frame:\n"
         + "\n".join("  " + blocker_text(blocker) for blocker in blockers),
@@ -104,13 +107,13 @@ def explanation(plan: FixingPlan) -> str:
     return "\n\n".join(sections)
 
 
-def step_texts(plan: FixingPlan) -> list[str]:
+def step_texts(line: AssemblyLine) -> list[str]:
     """Return each step's A list and reason."""
     return [
-        f"  A({subassembly_name(plan.order[: number + 1])}; {step.item}): "
+        f"  A({subassembly_name(line.order[: number + 1])}; {step.item}): "
         f"{', '.join([*open_directions(step.directions), *map(direction_label, step.slanted)])}. "
         f"{step.reason}"
-        for number, step in enumerate(plan.steps)
+        for number, step in enumerate(line.steps)
     ]
 
 

@@ -34,11 +34,11 @@ Result = tuple[tuple[str, ...], tuple[FixingStep, ...], Stop | None]
 
 
 @dataclass(frozen=True)
-class SubassemblyPlan:
-    """How a sub-assembly is built, before it is added to the rest as one item.
+class AssemblyLine:
+    """How a product is built, or a sub-assembly before it is added to the rest as one item.
 
     Attributes:
-        name: Its item of the main order, or of another sub-assembly's.
+        name: Of the product; of a sub-assembly, its item of the main order or of another one's.
         parts: Names of its parts, in matrix order.
         order: Its items in the order of assembly.
         steps: One per incoming item.
@@ -73,7 +73,7 @@ class OrderSearch:
         self.product, self.matrices, self.setup, self.named = product, matrices, setup, named
         self.ways = ways
         self.advice: OrderAdvice | None = None
-        self.built: list[SubassemblyPlan] = []
+        self.built: list[AssemblyLine] = []
 
     def given(self, order: tuple[str, ...], others: tuple[str, ...] = ()) -> Result:
         """Follow an order that was asked for; advise on others if it stops.
@@ -111,7 +111,7 @@ class OrderSearch:
             chosen = fallback_order(self.product, names, self.matrices, self.ways.slanted)
         product = with_groups(self.product, advice.subassemblies)
         self.built = [
-            SubassemblyPlan(
+            AssemblyLine(
                 whole.name,
                 tuple(name for name in product.parts if name in whole.parts),
                 whole.order,
@@ -128,7 +128,7 @@ class OrderSearch:
         self.ways = inner.ways
         members = self.product.members(name)
         parts = tuple(part for part in self.product.parts if part in members)
-        self.built += [*inner.built, SubassemblyPlan(name, parts, order, steps)]
+        self.built += [*inner.built, AssemblyLine(name, parts, order, steps)]
         if stop is None:
             return None
         reason = f"it cannot be built: {stop.reason}"

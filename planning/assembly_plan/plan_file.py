@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from cell.errors import InputError
-from planning.assembly_plan.order_search import SubassemblyPlan
+from planning.assembly_plan.order_search import AssemblyLine
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING, FixingStep, Stop
 from planning.feasibility.directions import DIRECTIONS
@@ -133,7 +133,7 @@ def _slanted_from_dict(data: Mapping[str, Any]) -> Slanted:
     return Slanted((x, y, z), np.array(data["free"], int), None, blockers)
 
 
-def _subassembly_to_dict(built: SubassemblyPlan) -> dict[str, Any]:
+def _subassembly_to_dict(built: AssemblyLine) -> dict[str, Any]:
     return {
         "name": built.name,
         "parts": list(built.parts),
@@ -142,8 +142,8 @@ def _subassembly_to_dict(built: SubassemblyPlan) -> dict[str, Any]:
     }
 
 
-def _subassembly_from_dict(data: Mapping[str, Any]) -> SubassemblyPlan:
-    return SubassemblyPlan(
+def _subassembly_from_dict(data: Mapping[str, Any]) -> AssemblyLine:
+    return AssemblyLine(
         data["name"],
         tuple(data["parts"]),
         tuple(data["order"]),

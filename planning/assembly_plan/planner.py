@@ -12,7 +12,7 @@ import numpy as np
 from cell.configuration.config import CellConfig
 from cell.errors import InputError, UnknownName
 from cell.products.product import Product
-from planning.assembly_plan.order_search import OrderSearch, SubassemblyPlan, named_subassemblies
+from planning.assembly_plan.order_search import AssemblyLine, OrderSearch, named_subassemblies
 from planning.feasibility.algorithm import FixingStep, Stop
 from planning.feasibility.cache import cached_matrices
 from planning.feasibility.directions import DIRECTIONS
@@ -68,7 +68,7 @@ class FixingPlan:
     orders: OrderAdvice | None = None
     matrices: AssemblyMatrices | None = None
     slanted: tuple[Slanted, ...] = ()
-    subassemblies: tuple[SubassemblyPlan, ...] = ()
+    subassemblies: tuple[AssemblyLine, ...] = ()
     unplanned: tuple[Unplanned, ...] = ()
     likely_cause: str = ""
 
@@ -76,6 +76,12 @@ class FixingPlan:
     def feasible(self) -> bool:
         """Whether every item of the product can be added, and no overlap is unexplained."""
         return self.stop is None and not self.unplanned and not self.overlaps
+
+    @property
+    def lines(self) -> tuple[AssemblyLine, ...]:
+        """The sub-assemblies in the order in which they are built, then the product itself."""
+        own = AssemblyLine(self.product, self.parts, self.order, self.steps)
+        return (*self.subassemblies, own)
 
     @property
     def overlaps(self) -> tuple[Overlap, ...]:

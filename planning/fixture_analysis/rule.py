@@ -102,21 +102,6 @@ def _verdict(ranked: Sequence[Candidate], paper: int) -> str:
     )
 
 
-def unheld_text(choices: Sequence[Choice]) -> str:
-    """Return in which steps the jig can hold nothing in any posture; "" if there is none."""
-    unheld = [choice for choice in choices if choice.best is None]
-    if not unheld:
-        return ""
-    which = (
-        "every step" if len(unheld) == len(choices) else f"{len(unheld)} of {len(choices)} steps"
-    )
-    first = unheld[0].candidates[unheld[0].paper]
-    return (
-        f"Feasible by geometry, but in {which} this jig can hold nothing in any posture; "
-        f"{unheld[0].item}: {first.label}: {first.rejected}."
-    )
-
-
 def choices_to_list(choices: Sequence[Choice]) -> list[dict[str, Any]]:
     """Return plain lists, numbers and strings, one entry per step; SI units in the names."""
     return [
