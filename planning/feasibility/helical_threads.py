@@ -169,7 +169,10 @@ def _sectioned(
     inner, low, outer, high = max(thick.decompose(), key=CrossSection.area).bounds()
     inner, low, outer, high = inner - thin, low - thin, outer + thin, high + thin
     depth = max(1e3 * tolerance, CROSSING * (outer - inner))
-    return _Pair(shrunk(bolt_sections, depth), nut_sections, inner, outer, low, high, depth)
+    pair = _Pair(shrunk(bolt_sections, depth), nut_sections, inner, outer, low, high, depth)
+    # As it is drawn, the overlap must not be deeper either: as that of two plain cylinders is.
+    drawn = meeting(pair.bolt, pair.nut, 0, 0.0).max()
+    return pair if drawn <= pair.trace else None
 
 
 @dataclass(frozen=True, eq=False)
