@@ -90,7 +90,8 @@ def _summary(plan: FixingPlan, verdict: Verdict, notes: Sequence[str]) -> str:
     paragraphs = "".join(f"<p>{escape(note)}</p>\n" for note in notes)
     return (
         f"<h1>{escape(plan.product)}: plan</h1>\n"
-        f'<p><span class="verdict {kind}">{escape(words)}</span></p>\n{stop}{paragraphs}{pairs(facts)}'
+        f'<p><span class="verdict {kind}">{escape(words)}</span></p>\n{stop}'
+        f"{paragraphs}{pairs(facts)}"
     )
 
 

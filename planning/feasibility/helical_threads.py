@@ -12,7 +12,7 @@ a third part that holds its head, is not seen.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import manifold3d
@@ -27,7 +27,6 @@ from planning.feasibility.axial_sections import (
     shrunk,
 )
 from planning.feasibility.cad_threads import CadThread
-from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.screw_axis import THREAD_CLEARANCE, screw_axis
 from planning.feasibility.solids import Solid, boxes_apart
 
@@ -55,9 +54,9 @@ def find_helical_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | Non
         b: The other; either may be the bolt.
         tolerance: Depth of overlap that does not count [m].
 
-    It takes a tenth of a second for two parts of 10,000 faces. Call it for parts that are near each
-    other and blocked in all six directions. Only these two parts are looked at: whether others keep
-    the bolt from turning is not.
+    It takes 0.2 s for a pair of 25,000 faces and 1 s for 300,000. Call it for parts that are near
+    each other and blocked in all six directions. Only these two parts are looked at: whether others
+    keep the bolt from turning, such as a pocket for its head, is not.
     """
     found = screw_axis(a, b)
     if found is None or not min(found.outward) < 0.0 < max(found.outward):
@@ -104,17 +103,14 @@ def find_helical_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | Non
 
 
 def helical_threads(
-    solids: Sequence[Solid], free: Mapping[str, np.ndarray], tolerance: float
+    pairs: Iterable[tuple[Solid, Solid]], tolerance: float
 ) -> tuple[CadThread, ...]:
-    """Return the helical threads among parts, looking only at pairs that nothing else separates.
+    """Return the helical threads among pairs of parts that are near enough to have one.
 
     Args:
-        solids: The n parts in matrix order.
-        free: M_j per direction, (n, n) each: pairs with a 1 in any of them are left alone.
+        pairs: Parts of which neither leaves the other along the six directions.
         tolerance: Depth of overlap that does not count [m].
     """
-    held = ~np.any([free[j] | free[j].T for j in DIRECTIONS], axis=0)
-    pairs = [(solids[i], solids[k]) for i, k in np.argwhere(np.triu(held, 1))]
     near = [(a, b) for a, b in pairs if not boxes_apart(a, b, THREAD_CLEARANCE)]
     found = [find_helical_thread(a, b, tolerance) for a, b in near]
     return tuple(thread for thread in found if thread is not None)
@@ -145,20 +141,30 @@ def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
     outer = (thread.diameter + thread.height) / 2.0 / np.cos(np.pi / ROUND)
     inner = max((thread.diameter - 3.0 * thread.height) / 2.0, thread.diameter / 8.0)
     tube, bore = (manifold3d.Manifold.cylinder(far - start, r, r, ROUND) for r in (outer, inner))
-    x = np.linalg.svd(axis[None])[2][1]
-    R_AS = np.array([x, np.cross(axis, x), axis]).T
-    zone = (tube - bore).translate([0.0, 0.0, start]).transform(np.c_[R_AS, middle])
+    zone = (tube - bore).translate([0.0, 0.0, start]).transform(np.c_[_frame(axis), middle])
     mesh = (nut.manifold - zone).to_mesh64()
     vertices = np.array(mesh.vert_properties)[:, :3]
     return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
+
+
+def _frame(axis: np.ndarray) -> np.ndarray:
+    """Return R_AS (3, 3) of a frame S whose z is the axis."""
+    x = np.linalg.svd(axis[None])[2][1]
+    return np.array([x, np.cross(axis, x), axis]).T
 
 
 def _sectioned(
     bolt: Solid, nut: Solid, axis: np.ndarray, centre: np.ndarray, tolerance: float
 ) -> _Pair | None:
     """Return the sections of two parts, or None if they do not interlock as they turn in place."""
+    # Of the nut, what the bolt can reach: sections of a large plate with many holes take long.
+    arm = bolt.vertices - centre
+    radius = float(np.linalg.norm(np.cross(arm, axis), axis=1).max()) + THREAD_CLEARANCE
+    far = float(np.linalg.norm(np.concatenate([arm, nut.vertices - centre]), axis=1).max())
+    reached = manifold3d.Manifold.cube([2.0 * radius, 2.0 * radius, 2.0 * far], True)
+    reached = reached.transform(np.c_[_frame(axis), centre])
     bolt_sections = axial_sections(bolt.manifold, axis, centre)
-    nut_sections = axial_sections(nut.manifold, axis, centre)
+    nut_sections = axial_sections(nut.manifold ^ reached, axis, centre)
     # What the two share if either is turned on the spot: the heights of the thread, all around.
     shared = CrossSection.batch_boolean(bolt_sections, OpType.Add)
     shared ^= CrossSection.batch_boolean(nut_sections, OpType.Add)
@@ -169,7 +175,10 @@ def _sectioned(
     inner, low, outer, high = max(thick.decompose(), key=CrossSection.area).bounds()
     inner, low, outer, high = inner - thin, low - thin, outer + thin, high + thin
     depth = max(1e3 * tolerance, CROSSING * (outer - inner))
-    return _Pair(shrunk(bolt_sections, depth), nut_sections, inner, outer, low, high, depth)
+    pair = _Pair(shrunk(bolt_sections, depth), nut_sections, inner, outer, low, high, depth)
+    # As it is drawn, the overlap must not be deeper either: as that of two plain cylinders is.
+    drawn = meeting(pair.bolt, pair.nut, 0, 0.0).max()
+    return pair if drawn <= pair.trace else None
 
 
 @dataclass(frozen=True, eq=False)

@@ -94,13 +94,6 @@ def matrices_of(
     tolerances, gaps = tolerances_of(parts, declared, source)
     overlap = tolerances.overlaps(names)
     leaving = interference(parts, overlap)
-    # Threads with real flanks first: drawn without clearance they overlap, and that is no error.
-    turning = helical_threads(parts, leaving.free, tolerances.overlap)
-    for thread in turning:
-        bolt, nut = names.index(thread.bolt), names.index(thread.nut)
-        gaps[bolt, nut] = gaps[nut, bolt] = 0.0  # Flanks bear, whatever clearance is drawn.
-    if declared is None:
-        tolerances, gaps = connecting(tolerances, parts, gaps)
     # Pairs that may overlap by more than the tolerance: their surfaces meet, and neither leaves the
     # other with a margin to spare. A layer of overlap between one and two tolerances thick is too
     # narrow to block across it, but only just.
@@ -108,12 +101,18 @@ def matrices_of(
     held = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
     suspect = (gaps == 0.0) & np.all(held, axis=0)
     suspects = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
-    known = {frozenset((thread.bolt, thread.nut)) for thread in turning}
-    suspects = [pair for pair in suspects if frozenset(pair) not in known]
     overlaps = find_overlaps(product, solids, tolerances, suspects)
+    locked = np.all([leaving.free[j] + leaving.free[j].T == 0 for j in DIRECTIONS], axis=0)
+    apart = [(parts[i], parts[k]) for i, k in np.argwhere(np.triu(locked & (gaps > 0.0), 1))]
+    turning = helical_threads(apart, tolerances.overlap)
     overlaps = replace(overlaps, threads=(*turning, *overlaps.threads))
+    for thread in overlaps.threads:
+        bolt, nut = names.index(thread.bolt), names.index(thread.nut)
+        gaps[bolt, nut] = gaps[nut, bolt] = 0.0  # Flanks bear, whatever clearance is drawn.
+    if declared is None:
+        tolerances, gaps = connecting(tolerances, parts, gaps)
     for pair in fitted_pairs(solids, overlaps, tolerances):
-        leaving = _redecided(leaving, names, pair, tolerances, turning)
+        leaving = _redecided(leaving, names, pair, tolerances, overlaps.threads)
     undercuts = tuple(_undercuts(product, solids, leaving, tolerances.overlap))
     for one in undercuts:
         i, k = names.index(one.part), names.index(one.other)

@@ -20,6 +20,7 @@ from cell.products.product import Product
 from planning.feasibility.cad_threads import THREAD_HEIGHT_PER_PITCH, CadThread, find_thread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.facets import sagitta
+from planning.feasibility.helical_threads import find_helical_thread
 from planning.feasibility.interference import interference
 from planning.feasibility.overlap_depth import overlap_of
 from planning.feasibility.solids import Solid
@@ -84,7 +85,10 @@ def find_overlaps(
     for a, b in suspects:
         tolerance = tolerances.overlap_of(a, b)
         declared = product.declared.overlap_kind(a, b)
-        thread = None if declared else find_thread(solids[a], solids[b], tolerance)
+        pair = solids[a], solids[b]
+        thread = None
+        if not declared:
+            thread = find_thread(*pair, tolerance) or find_helical_thread(*pair, tolerance)
         if thread:
             threads.append(thread)
             continue

@@ -20,7 +20,7 @@ from planning.feasibility.solids import Solid
 # [m] [A] Largest gap of an engaged thread: 0.3 mm of a print and its facets, with a third more.
 THREAD_CLEARANCE = 4e-4
 SAMPLES = 4000  # Points on each part: 0.2 mm apart on an M8 nut.
-MOST_FACES = 20_000  # Of each part that are looked at: every second, third ... of larger ones.
+MOST_FACES = 8_000  # Of each part that are looked at: every second, third ... of larger ones.
 DEGREE_TWO = (np.ones((3, 3)) + 3.0 * np.eye(3)) / 6.0  # Barycentric points that integrate exactly.
 FEWEST = 50  # Near points of each part below which nothing can be said about its shape.
 ROUNDS = 12  # Repetitions of the fit, until its weights have settled.
