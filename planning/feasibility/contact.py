@@ -23,6 +23,7 @@ from planning.feasibility.face_pairs import box_pairs
 from planning.feasibility.solids import Solid
 
 WIDEST = 16  # Faces of one part that are compared with the other's before all are.
+WIDE = 1e-4  # [m] [M] From here on, too many boxes meet for finding them to save time.
 TOUCHING = 1e-9  # [m] [D] Faces drawn on each other coincide to the rounding of float64, 1e-16 m.
 
 
@@ -41,7 +42,9 @@ def near_gap(a: Solid, b: Solid, reach: float) -> float:
     near = np.flatnonzero(meet.all(axis=2).any(axis=0))
     if _gap(a, b, few, faces_b[near[: 2 * WIDEST]]) <= TOUCHING:
         return 0.0
-    gap = _gap(a, b, *_meeting(a, b, faces_a, faces_b, reach))
+    if reach <= WIDE:
+        faces_a, faces_b = _meeting(a, b, faces_a, faces_b, reach)
+    gap = _gap(a, b, faces_a, faces_b)
     return gap if gap <= reach else np.inf
 
 
