@@ -33,6 +33,7 @@ from planning.feasibility.face_pairs import (
 # Of the tolerance: a decision with less margin than this is reported. [D] Seen edge on, a layer of
 # overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
+COARSE = 0.2  # [A] Tolerances: blocked at 1.9 tolerances if so seen, and 1.5 are asked for.
 HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um.
 
 HEAD = 24  # Widest faces of each part that the second round uses, up and down.
@@ -59,19 +60,25 @@ class Decision:
     margin: float
 
 
-def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, int], Decision]:
+def decisions(
+    views: Sequence[Envelope], tolerance: float, coarse: Sequence[Envelope] = ()
+) -> dict[tuple[int, int], Decision]:
     """Return a decision for each ordered pair (moving, stationary) whose boxes are in the way.
 
     Args:
         views: The parts' envelopes along one axis.
         tolerance: Height of overlap and radius of the region that do not count [m].
+        coarse: Envelopes of surfaces that lie within ``COARSE`` tolerances of the parts', with far
+            fewer faces; they settle most blocked pairs. None if the parts are coarse already.
 
     Pairs left out are free, by a margin of at least ``FRAGILE`` times the tolerance.
     """
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
-    hits = _wide_hits(views, pairs, more)
-    hits |= _probed(views, pairs, hits, more)
+    hits = _coarse_hits(coarse, pairs, more + 2.0 * COARSE * tolerance) if coarse else {}
+    hits |= _wide_hits(views, _without(pairs, hits), more)
+    if not coarse:
+        hits |= _probed(views, pairs, hits, more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
@@ -84,6 +91,24 @@ def decisions(views: Sequence[Envelope], tolerance: float) -> dict[tuple[int, in
             found |= _decided(group, tolerance)
             group, held = {}, 0
     return found | _decided(group, tolerance)
+
+
+def _without(pairs: np.ndarray, known: Mapping[tuple[int, int], np.ndarray]) -> np.ndarray:
+    """Return the pairs (p, 2) that are not known yet."""
+    return pairs[[(int(i), int(k)) not in known for i, k in pairs]]
+
+
+def _coarse_hits(
+    views: Sequence[Envelope], pairs: np.ndarray, tolerance: float
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return a blocked point (2,) for each pair that is easily seen to be blocked."""
+    hits = _wide_hits(views, pairs, tolerance)
+    hits |= _probed(views, pairs, hits, tolerance)
+    for i, k in ((int(i), int(k)) for i, k in _without(pairs, hits)):
+        crossing = crossing_faces(views[i].down, views[k].up, tolerance)
+        if len(crossing):
+            hits |= _region_hits({(i, k): crossing}, tolerance)
+    return hits
 
 
 def _probed(

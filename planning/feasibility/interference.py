@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.feasibility.blocking import FRAGILE, Decision, decisions
+from planning.feasibility.blocking import COARSE, FRAGILE, Decision, decisions
 from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
 from planning.feasibility.envelope import PLANE, Envelope, Faces, envelope
 from planning.feasibility.face_pairs import heights_over
@@ -29,6 +29,8 @@ from planning.feasibility.solids import Solid
 # rounding of mesh files, below any overlap that matters: the decisions for the motor unit stay the
 # same from 1e-7 to 5e-4 m.
 FIT_TOLERANCE = 5e-5
+
+MANY = 1000  # Faces of a part; fewer are not worth simplifying.
 
 
 @dataclass(frozen=True)
@@ -80,9 +82,13 @@ def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> I
     free = {j: 1 - np.eye(count, dtype=int) for j in DIRECTIONS}
     margin = {j: np.full((count, count), FRAGILE * tolerance) for j in DIRECTIONS}
     blockers = []
+    fine = any(_finer(solid, tolerance) for solid in solids)
+    coarse = [_coarser(solid, tolerance) for solid in solids] if fine else []
     for forward in ("+x", "+y", "+z"):
-        views = [envelope(solid, axis_index(forward)) for solid in solids]
-        decided = decisions(views, tolerance)
+        views, rough = (
+            [envelope(solid, axis_index(forward)) for solid in some] for some in (solids, coarse)
+        )
+        decided = decisions(views, tolerance, rough)
         for (i, k), decision in decided.items():
             blocked = decision.point is not None
             margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
@@ -90,6 +96,17 @@ def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> I
         for hit in _evidence(views, forward, decided, tolerance):
             blockers += [hit, hit.reversed()]
     return Interference(free, tuple(blockers), margin)
+
+
+def _finer(solid: Solid, tolerance: float) -> bool:
+    """Return whether most faces of a part of many are smaller than a disc of the tolerance."""
+    areas = np.linalg.norm(solid.doubled_areas, axis=1) / 2.0
+    return len(areas) > MANY and float(np.median(areas)) < np.pi * tolerance**2
+
+
+def _coarser(solid: Solid, tolerance: float) -> Solid:
+    """Return a part with as few faces as the tolerance allows."""
+    return solid.simplified(COARSE * tolerance) if _finer(solid, tolerance) else solid
 
 
 def first_hit(
