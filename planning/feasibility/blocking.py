@@ -34,7 +34,7 @@ from planning.feasibility.face_pairs import (
 # overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
 COARSE = 0.2  # [A] Tolerances: blocked at 1.9 tolerances if so seen, and 1.5 are asked for.
-HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um.
+HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um, or to 6 um.
 
 HEAD = 24  # Widest faces of each part that the second round uses, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
@@ -88,9 +88,9 @@ def decisions(
         group[i, k] = crossing_faces(views[i].down, views[k].up, less)
         held += len(group[i, k])
         if held > GROUP:
-            found |= _decided(group, tolerance)
+            found |= _decided(group, tolerance, quick=not coarse)
             group, held = {}, 0
-    return found | _decided(group, tolerance)
+    return found | _decided(group, tolerance, quick=not coarse)
 
 
 def _without(pairs: np.ndarray, known: Mapping[tuple[int, int], np.ndarray]) -> np.ndarray:
@@ -216,12 +216,18 @@ def _widest_rectangles(
 
 
 def _decided(
-    group: dict[tuple[int, int], FacePairs], tolerance: float
+    group: dict[tuple[int, int], FacePairs], tolerance: float, *, quick: bool
 ) -> dict[tuple[int, int], Decision]:
-    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance."""
+    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance.
+
+    Args:
+        group: These faces.
+        tolerance: Height of overlap and radius of the region that do not count [m].
+        quick: Whether a few faces are tried before all; not worth it if coarse ones were.
+    """
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     group = {parts: pairs for parts, pairs in group.items() if len(pairs)}
-    hits = _region_hits(group, more)
+    hits = _region_hits(group, more) if quick else {}
     found = {parts: Decision(point, FRAGILE * tolerance) for parts, point in hits.items()}
     for parts, pairs in group.items():
         if parts in found:
@@ -295,7 +301,7 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     point = _blocked_point(pairs, tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS if len(pairs) < BATCH else HALVINGS // 2):
         middle = (same + flipped) / 2
         changed = _blocked_point(pairs, tolerance + middle * step)
         if (changed is None) == (point is None):

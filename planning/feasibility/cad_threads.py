@@ -69,9 +69,10 @@ def find_thread(a: Solid, b: Solid, tolerance: float) -> CadThread | None:
         return None
     axis, middle, inner, outer, length = tube
     radius = inner - min(ROUND * outer + tolerance, inner / 2)
-    if _fills(a, middle, axis, radius) == _fills(b, middle, axis, radius):
+    inside = [_fills(solid, middle, axis, radius) for solid in (a, b)]
+    if inside[0] == inside[1]:
         return None
-    bolt, nut = (a, b) if _fills(a, middle, axis, radius) else (b, a)
+    bolt, nut = (a, b) if inside[0] else (b, a)
     # The bolt leaves on the side on which it protrudes further from the nut.
     bolt_along, nut_along = bolt.vertices @ axis, nut.vertices @ axis
     ahead, behind = bolt_along.max() - nut_along.max(), nut_along.min() - bolt_along.min()
@@ -187,7 +188,7 @@ def _fills(solid: Solid, middle: np.ndarray, axis: np.ndarray, radius: float) ->
     ray = np.cross(axis, side)
     angles = 2.0 * np.pi * (np.arange(PROBES) + 0.37) / PROBES
     points = [middle + radius * (np.cos(t) * side + np.sin(t) * ray) for t in angles]
-    size = 0.02 * radius
-    probes = [manifold3d.Manifold.sphere(size, 6).translate(list(p)) for p in points]
-    inside = [(solid.manifold ^ probe).volume() > 0.5 * probe.volume() for probe in probes]
-    return all(inside)
+    probe = manifold3d.Manifold.sphere(0.02 * radius, 6)
+    probes = manifold3d.Manifold.compose([probe.translate(list(p)) for p in points])
+    found = [piece.volume() for piece in (solid.manifold ^ probes).decompose()]
+    return sum(volume > 0.5 * probe.volume() for volume in found) == PROBES

@@ -100,8 +100,10 @@ class Solid:
 
     def _shaped(self, manifold: manifold3d.Manifold) -> Solid:
         mesh = manifold.to_mesh64()
-        vertices = np.array(mesh.vert_properties)[:, :3]
-        return Solid(self.name, vertices, np.array(mesh.tri_verts, int), self.mass, self.p_AoG)
+        vertices, faces = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts, int)
+        shaped = Solid(self.name, vertices, faces, self.mass, self.p_AoG)
+        vars(shaped)["manifold"] = manifold  # It need not be built from the mesh again.
+        return shaped
 
 
 def solid_of(part: Part) -> Solid:
