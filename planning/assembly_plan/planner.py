@@ -17,7 +17,12 @@ from planning.feasibility.cache import cached_matrices
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence import Evidence, evidence_of
 from planning.feasibility.interference import Blocker
-from planning.feasibility.matrices import AssemblyMatrices, matrices_of, reachable_matrices
+from planning.feasibility.matrices import (
+    AssemblyMatrices,
+    Progress,
+    matrices_of,
+    reachable_matrices,
+)
 from planning.feasibility.order import check_order
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.ordering.advice import OrderAdvice, advise, fallback_order
@@ -71,6 +76,7 @@ def plan(
     tolerance: float | None = None,
     cache: Path | None = None,
     slanted: bool = False,
+    progress: Progress = lambda done, total: None,
 ) -> FixingPlan:
     """Decide what is fixed on the jig, and how, in each step of an assembly.
 
@@ -85,6 +91,7 @@ def plan(
         cache: Folder of the matrix cache; None to compute the matrices without it.
         slanted: Whether to search, in each step, for slanted removal directions and local freedom.
             They are reported; the steps follow from the six directions alone.
+        progress: Is told how many comparisons of two parts have been made, of how many.
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
@@ -96,9 +103,9 @@ def plan(
     _validate(product, order)
     setup = FixtureSetup.of(config or CellConfig())
     if cache is None:
-        matrices = matrices_of(product, tolerance)
+        matrices = matrices_of(product, tolerance, progress=progress)
     else:
-        matrices = cached_matrices(product, tolerance, cache)
+        matrices = cached_matrices(product, tolerance, cache, progress)
     contact, leaving = matrices.contact, matrices.interference
     advice = advise(product, matrices, setup) if order is None else None
     if order is not None:

@@ -13,7 +13,7 @@ half of it, is decided with a margin of at least half the tolerance (0.025 mm of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -61,7 +61,10 @@ class Decision:
 
 
 def decisions(
-    views: Sequence[Envelope], tolerance: float, coarse: Sequence[Envelope] = ()
+    views: Sequence[Envelope],
+    tolerance: float,
+    coarse: Sequence[Envelope] = (),
+    tell: Callable[[int], None] = lambda done: None,
 ) -> dict[tuple[int, int], Decision]:
     """Return a decision for each ordered pair (moving, stationary) whose boxes are in the way.
 
@@ -70,6 +73,7 @@ def decisions(
         tolerance: Height of overlap and radius of the region that do not count [m].
         coarse: Envelopes of surfaces that lie within ``COARSE`` tolerances of the parts', with far
             fewer faces; they settle most blocked pairs. None if the parts are coarse already.
+        tell: Is told how many ordered pairs have been decided.
 
     Pairs left out are free, by a margin of at least ``FRAGILE`` times the tolerance.
     """
@@ -82,9 +86,11 @@ def decisions(
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
-    for i, k in ((int(i), int(k)) for i, k in pairs):
+    quick = len(views) * (len(views) - 1) - len(pairs)  # Decided by their boxes.
+    for number, (i, k) in enumerate(((int(i), int(k)) for i, k in pairs)):
         if (i, k) in found:
             continue
+        tell(quick + number)
         group[i, k] = crossing_faces(views[i].down, views[k].up, less)
         held += len(group[i, k])
         if held > GROUP:

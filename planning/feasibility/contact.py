@@ -18,7 +18,7 @@ touch already, the rest are skipped.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import fcl
 import numpy as np
@@ -100,12 +100,15 @@ def one_inside_other(a: Solid, b: Solid) -> bool:
     return bool(a_in_b or b_in_a) and (a.manifold ^ b.manifold).volume() > 0.0
 
 
-def gap_matrix(solids: Sequence[Solid], reach: float) -> np.ndarray:
+def gap_matrix(
+    solids: Sequence[Solid], reach: float, tell: Callable[[int], None] = lambda done: None
+) -> np.ndarray:
     """Return the pairwise distances between parts, up to a reach.
 
     Args:
         solids: The n parts, in matrix order.
         reach: Gap beyond which the distance does not matter [m].
+        tell: Is told how many pairs have been measured.
 
     Returns:
         (n, n) [m], symmetric: 0 where parts touch or one lies in the other's material, infinity
@@ -114,7 +117,10 @@ def gap_matrix(solids: Sequence[Solid], reach: float) -> np.ndarray:
     gaps = np.full((len(solids), len(solids)), np.inf)
     lower, upper = np.array([s.lower for s in solids]), np.array([s.upper for s in solids])
     near = (lower[:, None] - upper[None]).max(axis=2) <= reach
-    for i, k in np.argwhere(np.triu(near & near.T, 1)):
+    pairs = np.argwhere(np.triu(near & near.T, 1))
+    apart = len(solids) * (len(solids) - 1) // 2 - len(pairs)
+    for done, (i, k) in enumerate(pairs):
+        tell(apart + done)
         gap = near_gap(solids[i], solids[k], reach)
         inside = gap > 0.0 and one_inside_other(solids[i], solids[k])
         gaps[i, k] = gaps[k, i] = 0.0 if inside else gap

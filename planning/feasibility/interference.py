@@ -14,7 +14,7 @@ surfaces cross by their sagitta.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -76,19 +76,32 @@ class Interference:
     margin: Mapping[str, np.ndarray]
 
 
-def interference(solids: Sequence[Solid], tolerance: float = FIT_TOLERANCE) -> Interference:
-    """Return the six matrices M_j of n parts in matrix order; the tolerance is in [m]."""
+def interference(
+    solids: Sequence[Solid],
+    tolerance: float = FIT_TOLERANCE,
+    tell: Callable[[int], None] = lambda done: None,
+) -> Interference:
+    """Return the six matrices M_j of n parts.
+
+    Args:
+        solids: The parts, in matrix order.
+        tolerance: Height of overlap and radius of the region that do not count [m].
+        tell: Is told how many pairs have been decided, each once along every axis.
+    """
     count = len(solids)
     free = {j: 1 - np.eye(count, dtype=int) for j in DIRECTIONS}
     margin = {j: np.full((count, count), FRAGILE * tolerance) for j in DIRECTIONS}
     blockers = []
     fine = any(_finer(solid, tolerance) for solid in solids)
     coarse = [_coarser(solid, tolerance) for solid in solids] if fine else []
-    for forward in ("+x", "+y", "+z"):
+    every = count * (count - 1) // 2
+    for axis, forward in enumerate(("+x", "+y", "+z")):
         views, rough = (
             [envelope(solid, axis_index(forward)) for solid in some] for some in (solids, coarse)
         )
-        decided = decisions(views, tolerance, rough)
+        decided = decisions(
+            views, tolerance, rough, lambda done, axis=axis: tell(axis * every + done // 2)
+        )
         for (i, k), decision in decided.items():
             blocked = decision.point is not None
             margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin

@@ -11,7 +11,7 @@ P_t displaced along j, flips every sign and contradicts the paper's table.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,6 +30,9 @@ from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import Interference, interference
 from planning.feasibility.overlaps import without_overlaps
 from planning.feasibility.solids import Solid, solids_of
+
+Progress = Callable[[int, int], None]
+"""Is told how many comparisons of two parts have been made, of how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +63,10 @@ class AssemblyMatrices:
 
 
 def matrices_of(
-    product: Product, tolerance: float | None = None, solids: Mapping[str, Solid] | None = None
+    product: Product,
+    tolerance: float | None = None,
+    solids: Mapping[str, Solid] | None = None,
+    progress: Progress = lambda done, total: None,
 ) -> AssemblyMatrices:
     """Compute the matrices of a product.
 
@@ -69,6 +75,7 @@ def matrices_of(
         tolerance: See ``AssemblyMatrices`` [m]; None for the product's own, or one derived from its
             sizes and clearances if it declares none.
         solids: The product's parts, if they have been built already.
+        progress: Each pair counts four times: its distance, and its motions along three axes.
 
     Raises:
         InputError: Parts overlap, and not as a bolt does in its thread.
@@ -77,9 +84,10 @@ def matrices_of(
     declared = product.contact_tolerance if tolerance is None else tolerance
     parts = list(solids.values())
     reach = max(1.0 + FRAGILE, 1.0 / PER_CLEARANCE) * (declared or largest_tolerance(parts))
-    gaps = gap_matrix(parts, reach)
+    every = len(parts) * (len(parts) - 1) // 2
+    gaps = gap_matrix(parts, reach, lambda done: progress(done, 4 * every))
     tolerance = declared or default_tolerance(parts, gaps)
-    leaving = interference(parts, tolerance)
+    leaving = interference(parts, tolerance, lambda done: progress(every + done, 4 * every))
     # Pairs that may overlap by more than the tolerance: their surfaces meet, and neither leaves the
     # other with a margin to spare. A layer of overlap between one and two tolerances thick is too
     # narrow to block across it, but only just.
