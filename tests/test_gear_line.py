@@ -9,7 +9,11 @@ from tiny_products import product_of
 from cell.errors import InputError
 from experiments.plan.gear_line import gear_line
 from planning import plan
+from planning.feasibility import interference as interference_file
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.interference import interference
 from planning.feasibility.matrices import matrices_of
+from planning.feasibility.solids import solids_of
 
 
 def test_everything_leaves_upwards_in_the_order_in_which_it_is_made():
@@ -31,3 +35,16 @@ def test_everything_leaves_upwards_in_the_order_in_which_it_is_made():
 def test_a_cover_in_its_pillars_is_refused():
     with pytest.raises(InputError, match=r"'pillar_1' and 'cover' overlap"):
         matrices_of(product_of(gear_line(1, fineness=0.3, overlap=0.3)))
+
+
+def test_simplified_surfaces_decide_like_the_parts_own(monkeypatch):
+    """Parts are simplified first where the tolerance is far wider than their facets."""
+    solids = list(solids_of(product_of(gear_line(1, fineness=0.5))).values())
+    simplified = [solid.name for solid in solids if interference_file._finer(solid, 1e-3)]
+    assert len(simplified) > 2
+    quick = interference(solids, 1e-3)
+    monkeypatch.setattr(interference_file, "MANY", 10**9)
+    thorough = interference(solids, 1e-3)
+    for j in DIRECTIONS:
+        np.testing.assert_array_equal(quick.free[j], thorough.free[j])
+    assert 0 < np.count_nonzero(quick.free["+z"]) < len(solids) ** 2 - len(solids)

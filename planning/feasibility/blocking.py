@@ -44,7 +44,7 @@ BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
 ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
-SEEDS, NEAR = 4, 4.0  # Widest slivers, each merged with the slivers within this many tolerances.
+SEEDS, NEAR = 4, 2.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
 
 @dataclass(frozen=True, eq=False)
@@ -319,6 +319,8 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
 
 def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
     """Return a point (2,) of the plane over which the faces block, or None."""
+    if len(pairs) > BATCH and (hits := _region_hits({(0, 1): pairs}, tolerance)):
+        return hits[0, 1]
     slivers: list[_Regions] = []
     for start in range(0, len(pairs), BATCH):
         batch = pairs.chosen(slice(start, start + BATCH))
