@@ -8,7 +8,11 @@ from tiny_products import product_of
 
 from experiments.plan.gear_line import gear_line
 from planning import plan
+from planning.feasibility import interference as interference_file
+from planning.feasibility.directions import DIRECTIONS
+from planning.feasibility.interference import interference
 from planning.feasibility.matrices import matrices_of
+from planning.feasibility.solids import solids_of
 
 
 def test_everything_leaves_upwards_in_the_order_in_which_it_is_made():
@@ -33,3 +37,16 @@ def test_a_cover_in_its_pillars_is_an_error():
     pillars = [name for name in shapes if name.startswith("pillar")]
     assert {(one.part, one.other) for one in errors} == {(pillar, "cover") for pillar in pillars}
     assert [one.depth for one in errors] == pytest.approx([3e-4] * len(pillars), rel=1e-3)
+
+
+def test_simplified_surfaces_decide_like_the_parts_own(monkeypatch):
+    """Parts are simplified first where the tolerance is far wider than their facets."""
+    solids = list(solids_of(product_of(gear_line(1, fineness=0.5))).values())
+    simplified = [solid.name for solid in solids if interference_file._finer(solid, 1e-3)]
+    assert len(simplified) > 2
+    quick = interference(solids, 1e-3)
+    monkeypatch.setattr(interference_file, "MANY", 10**9)
+    thorough = interference(solids, 1e-3)
+    for j in DIRECTIONS:
+        np.testing.assert_array_equal(quick.free[j], thorough.free[j])
+    assert 0 < np.count_nonzero(quick.free["+z"]) < len(solids) ** 2 - len(solids)

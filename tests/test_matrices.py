@@ -317,3 +317,13 @@ def test_rotations_are_the_24():
     assert len({R.tobytes() for R in rotations}) == 24
     assert all(RotationMatrix(R).IsValid() for R in rotations)
     assert axis_index(turned("+x", rotations[0])) == 0
+
+
+def test_progress_counts_every_comparison_of_two_parts():
+    """Four a pair; the count only grows, and each call states the same total."""
+    told: list[tuple[int, int]] = []
+    product = stack_of_three()
+    matrices_of(product, progress=lambda done, total: told.append((done, total)))
+    assert told and {total for _, total in told} == {4 * 3}
+    counts = [done for done, _ in told]
+    assert counts == sorted(counts) and counts[0] >= 0 and counts[-1] < 4 * 3

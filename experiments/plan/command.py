@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import resource
 import time
 from dataclasses import replace
 from pathlib import Path
@@ -73,7 +74,11 @@ def run_plan(
     described = replace(described, declared=declared)
     config = config or CellConfig()
     console = Console(highlight=False)
-    with console.status("Matrices, steps and orders ..."):
+    with console.status("Matrices, steps and orders ...") as status:
+
+        def show(done: int, total: int) -> None:
+            status.update(f"Matrices: {done} of {total} comparisons of two parts ...")
+
         fixing = plan(
             described,
             order,
@@ -81,6 +86,7 @@ def run_plan(
             tolerance=options.tolerance,
             cache=options.cache,
             slanted=options.slanted,
+            progress=show,
         )
     assert fixing.matrices is not None
     _print_plan(console, fixing, explain)
@@ -108,7 +114,8 @@ def run_plan(
     if fixing.orders:
         seconds = {"orders": fixing.orders.seconds} | seconds
     further = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
-    timing = f"Planned in {fixing.seconds:.2f} s; {further}."
+    most = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024  # Linux states it in kB.
+    timing = f"Planned in {fixing.seconds:.2f} s; {further}; at most {most:.0f} MB of memory."
     _print_lines(console, [timing, f"Verdict: {verdict.text}."])
     return 0 if fixing.feasible else 1
 

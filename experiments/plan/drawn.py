@@ -7,6 +7,7 @@ parts again: what is drawn is a simplified surface, and only its pose differs be
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -18,8 +19,8 @@ from pydrake.math import RigidTransform
 
 from cell.errors import BadPart
 from cell.products.mesh_io import obj_text
-from cell.products.product import Part, Product
-from planning.feasibility.solids import solid_of
+from cell.products.product import Product
+from planning.feasibility.solids import Solid, solids_of
 
 SHOWN = 1.0 / 1000.0
 """[D] Of the product's size: half a pixel, as a picture is 560 of them high."""
@@ -76,27 +77,27 @@ class DrawnProduct:
     shapes: Mapping[str, Shape]
 
     @staticmethod
-    def of(product: Product) -> DrawnProduct:
-        """Simplify all parts to what a picture of the whole product, or of one part, shows."""
-        parts = product.parts
-        corners = np.concatenate(
-            [part.X_AP.multiply(part.mesh.bounds.T).T for part in parts.values()]
-        )
-        deviation = SHOWN * float(np.linalg.norm(np.ptp(corners, axis=0)))
-        shapes = {name: Shape(_simplified(part, deviation)) for name, part in parts.items()}
+    def of(product: Product, solids: Mapping[str, Solid] | None = None) -> DrawnProduct:
+        """Simplify all parts to what a picture of the whole product, or of one part, shows.
+
+        Args:
+            product: What is drawn.
+            solids: Its parts in the product frame, if they have been built already.
+        """
+        solids = solids_of(product) if solids is None else solids
+        corners = np.array([(solid.lower, solid.upper) for solid in solids.values()])
+        size = corners[:, 1].max(axis=0) - corners[:, 0].min(axis=0)
+        deviation = SHOWN * float(np.linalg.norm(size))
+        shapes = {name: Shape(_simplified(solid, deviation)) for name, solid in solids.items()}
         return DrawnProduct(product, shapes)
 
 
-def _simplified(part: Part, deviation: float) -> trimesh.Trimesh:
+def _simplified(solid: Solid, deviation: float) -> trimesh.Trimesh:
     """Return a part in its assembled pose, its surface moved by less than a deviation [m]."""
-    solid = solid_of(part)
     deviation = min(deviation, SHOWN_ALONE * float(np.max(solid.upper - solid.lower)))
-    try:
-        coarse = solid.manifold.simplify(deviation).to_mesh64()
-    except BadPart:  # A surface that only the renderer can use is drawn as it is.
-        return trimesh.Trimesh(solid.vertices, solid.faces, process=False)
-    vertices, faces = np.array(coarse.vert_properties)[:, :3], np.array(coarse.tri_verts, int)
-    return trimesh.Trimesh(vertices, faces, process=False)
+    with suppress(BadPart):  # A surface that only the renderer can use is drawn as it is.
+        solid = solid.simplified(deviation)
+    return trimesh.Trimesh(solid.vertices, solid.faces, process=False)
 
 
 def box(bodies: Iterable[Body]) -> tuple[np.ndarray, np.ndarray]:

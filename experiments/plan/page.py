@@ -57,7 +57,7 @@ def write_page(
     evidence = evidence_text(plan.evidence) if plan.evidence else ""
     apart, drawn = "", None
     if plan.steps and problem is None:
-        drawn = DrawnProduct.of(product)
+        drawn = DrawnProduct.of(product, plan.matrices.solids if plan.matrices else None)
         shown = exploded(drawn, plan.steps)
         apart = _figure(shown, "Each item moved out against its mating direction")
     missing = [f"No pictures: {problem}."] if problem else []

@@ -18,7 +18,12 @@ from planning.feasibility.cache import cached_matrices
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.evidence import Evidence, evidence_of
 from planning.feasibility.interference import Blocker
-from planning.feasibility.matrices import AssemblyMatrices, matrices_of, reachable_matrices
+from planning.feasibility.matrices import (
+    AssemblyMatrices,
+    Progress,
+    matrices_of,
+    reachable_matrices,
+)
 from planning.feasibility.order import check_order
 from planning.feasibility.overlaps import Overlap
 from planning.feasibility.pose_doubt import pose_doubt
@@ -98,6 +103,7 @@ def plan(
     tolerance: float | None = None,
     cache: Path | None = None,
     slanted: bool = False,
+    progress: Progress = lambda done, total: None,
 ) -> FixingPlan:
     """Decide what is fixed on the jig, and how, in each step of an assembly.
 
@@ -112,6 +118,7 @@ def plan(
         cache: Folder of the matrix cache; None to compute the matrices without it.
         slanted: Whether to report, for each step, all slanted removal directions and local freedom.
             Slanted directions that a plan needs are found and used without it.
+        progress: Is told how many comparisons of two parts have been made, of how many.
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
@@ -125,9 +132,9 @@ def plan(
     _validate(whole, order)
     setup = FixtureSetup.of(config or CellConfig())
     if cache is None:
-        matrices = matrices_of(product, tolerance)
+        matrices = matrices_of(product, tolerance, progress=progress)
     else:
-        matrices = cached_matrices(product, tolerance, cache)
+        matrices = cached_matrices(product, tolerance, cache, progress)
     asked = order or (product.orders[0] if product.orders else None)
     unplanned = _unplanned(whole, asked or product.items(), matrices)
     left_out = {item.name for item in unplanned}

@@ -13,7 +13,7 @@ half of it, is decided with a margin of at least half the tolerance (0.025 mm of
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -33,7 +33,8 @@ from planning.feasibility.face_pairs import (
 # Of the tolerance: a decision with less margin than this is reported. [D] Seen edge on, a layer of
 # overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
-HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um.
+COARSE = 0.2  # [A] Tolerances: blocked at 1.9 tolerances if so seen, and 1.5 are asked for.
+HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um, or to 6 um.
 
 HEAD = 24  # Widest faces of each part that the second round uses, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
@@ -43,7 +44,7 @@ BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
 ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
-SEEDS, NEAR = 4, 4.0  # Widest slivers, each merged with the slivers within this many tolerances.
+SEEDS, NEAR = 4, 2.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,34 +61,65 @@ class Decision:
 
 
 def decisions(
-    views: Sequence[Envelope], tolerance: float, wanted: np.ndarray | None = None
+    views: Sequence[Envelope],
+    tolerance: float,
+    coarse: Sequence[Envelope] = (),
+    *,
+    wanted: np.ndarray | None = None,
+    tell: Callable[[int], None] = lambda done: None,
 ) -> dict[tuple[int, int], Decision]:
     """Return a decision for each ordered pair (moving, stationary) whose boxes are in the way.
 
     Args:
         views: The n parts' envelopes along one axis.
         tolerance: Height of overlap and radius of the region that do not count [m].
-        wanted: (n, n) bool: pairs to decide; None for all.
+        wanted: (n, n) bool: pairs to decide, none of them on the diagonal; None for all.
+        coarse: Envelopes of surfaces that lie within ``COARSE`` tolerances of the parts', with far
+            fewer faces; they settle most blocked pairs. None if the parts are coarse already.
+        tell: Is told how many ordered pairs have been decided.
 
     Pairs left out are free, by a margin of at least ``FRAGILE`` times the tolerance.
     """
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
     pairs = pairs if wanted is None else pairs[wanted[pairs[:, 0], pairs[:, 1]]]
-    hits = _wide_hits(views, pairs, more)
-    hits |= _probed(views, pairs, hits, more)
+    hits = _coarse_hits(coarse, pairs, more + 2.0 * COARSE * tolerance) if coarse else {}
+    hits |= _wide_hits(views, _without(pairs, hits), more)
+    if not coarse:
+        hits |= _probed(views, pairs, hits, more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
-    for i, k in ((int(i), int(k)) for i, k in pairs):
+    total = len(views) * (len(views) - 1) if wanted is None else np.count_nonzero(wanted)
+    quick = int(total) - len(pairs)  # Decided by their boxes.
+    for number, (i, k) in enumerate(((int(i), int(k)) for i, k in pairs)):
         if (i, k) in found:
             continue
+        tell(quick + number)
         group[i, k] = crossing_faces(views[i].down, views[k].up, less)
         held += len(group[i, k])
         if held > GROUP:
-            found |= _decided(group, tolerance)
+            found |= _decided(group, tolerance, quick=not coarse)
             group, held = {}, 0
-    return found | _decided(group, tolerance)
+    return found | _decided(group, tolerance, quick=not coarse)
+
+
+def _without(pairs: np.ndarray, known: Mapping[tuple[int, int], np.ndarray]) -> np.ndarray:
+    """Return the pairs (p, 2) that are not known yet."""
+    return pairs[[(int(i), int(k)) not in known for i, k in pairs]]
+
+
+def _coarse_hits(
+    views: Sequence[Envelope], pairs: np.ndarray, tolerance: float
+) -> dict[tuple[int, int], np.ndarray]:
+    """Return a blocked point (2,) for each pair that is easily seen to be blocked."""
+    hits = _wide_hits(views, pairs, tolerance)
+    hits |= _probed(views, pairs, hits, tolerance)
+    for i, k in ((int(i), int(k)) for i, k in _without(pairs, hits)):
+        crossing = crossing_faces(views[i].down, views[k].up, tolerance)
+        if len(crossing):
+            hits |= _region_hits({(i, k): crossing}, tolerance)
+    return hits
 
 
 def _probed(
@@ -195,12 +227,18 @@ def _widest_rectangles(
 
 
 def _decided(
-    group: dict[tuple[int, int], FacePairs], tolerance: float
+    group: dict[tuple[int, int], FacePairs], tolerance: float, *, quick: bool
 ) -> dict[tuple[int, int], Decision]:
-    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance."""
+    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance.
+
+    Args:
+        group: These faces.
+        tolerance: Height of overlap and radius of the region that do not count [m].
+        quick: Whether a few faces are tried before all; not worth it if coarse ones were.
+    """
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     group = {parts: pairs for parts, pairs in group.items() if len(pairs)}
-    hits = _region_hits(group, more)
+    hits = _region_hits(group, more) if quick else {}
     found = {parts: Decision(point, FRAGILE * tolerance) for parts, point in hits.items()}
     for parts, pairs in group.items():
         if parts in found:
@@ -274,7 +312,7 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     point = _blocked_point(pairs, tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS if len(pairs) < BATCH else HALVINGS // 2):
         middle = (same + flipped) / 2
         changed = _blocked_point(pairs, tolerance + middle * step)
         if (changed is None) == (point is None):
@@ -286,6 +324,8 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
 
 def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
     """Return a point (2,) of the plane over which the faces block, or None."""
+    if len(pairs) > BATCH and (hits := _region_hits({(0, 1): pairs}, tolerance)):
+        return hits[0, 1]
     slivers: list[_Regions] = []
     for start in range(0, len(pairs), BATCH):
         batch = pairs.chosen(slice(start, start + BATCH))

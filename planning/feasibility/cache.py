@@ -24,7 +24,7 @@ from cell.products.product import Product
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import Blocker, Interference
-from planning.feasibility.matrices import AssemblyMatrices, matrices_of
+from planning.feasibility.matrices import AssemblyMatrices, Progress, matrices_of
 from planning.feasibility.overlaps import Overlap, Overlaps
 from planning.feasibility.solids import Solid, solids_of
 from planning.feasibility.tolerance import Tolerances
@@ -37,13 +37,18 @@ def user_cache() -> Path:
     return (Path(root) if root else Path.home() / ".cache") / "soft-jig"
 
 
-def cached_matrices(product: Product, tolerance: float | None, folder: Path) -> AssemblyMatrices:
+def cached_matrices(
+    product: Product,
+    tolerance: float | None,
+    folder: Path,
+    progress: Progress = lambda done, total: None,
+) -> AssemblyMatrices:
     """Return what ``matrices_of`` returns, read from the folder if it was computed before."""
     solids = solids_of(product)
     file = folder / f"{key_of(product, solids, tolerance)}.npz"
     found = load_matrices(file, solids)
     if found is None:
-        found = matrices_of(product, tolerance, solids)
+        found = matrices_of(product, tolerance, solids, progress)
         save_matrices(found, file)
     return found
 

@@ -14,7 +14,7 @@ touch already, the rest are skipped.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import fcl
 import numpy as np
@@ -95,7 +95,10 @@ def one_inside_other(a: Solid, b: Solid) -> bool:
 
 
 def gap_matrix(
-    solids: Sequence[Solid], reach: float, wanted: np.ndarray | None = None
+    solids: Sequence[Solid],
+    reach: float,
+    wanted: np.ndarray | None = None,
+    tell: Callable[[int], None] = lambda done: None,
 ) -> np.ndarray:
     """Return the pairwise distances between parts, up to a reach.
 
@@ -103,6 +106,7 @@ def gap_matrix(
         solids: The n parts, in matrix order.
         reach: Gap beyond which the distance does not matter [m].
         wanted: (n, n) bool, symmetric: pairs to measure; None for all.
+        tell: Is told how many pairs have been measured.
 
     Returns:
         (n, n) [m], symmetric: 0 where parts touch or one lies in the other's material, infinity
@@ -112,7 +116,10 @@ def gap_matrix(
     lower, upper = np.array([s.lower for s in solids]), np.array([s.upper for s in solids])
     near = (lower[:, None] - upper[None]).max(axis=2) <= reach
     near &= near.T if wanted is None else near.T & wanted
-    for i, k in np.argwhere(np.triu(near, 1)):
+    pairs = np.argwhere(np.triu(near, 1))
+    apart = len(solids) * (len(solids) - 1) // 2 - len(pairs)
+    for done, (i, k) in enumerate(pairs):
+        tell(apart + done)
         gap = near_gap(solids[i], solids[k], reach)
         inside = gap > 0.0 and one_inside_other(solids[i], solids[k])
         gaps[i, k] = gaps[k, i] = 0.0 if inside else gap

@@ -14,12 +14,12 @@ surfaces cross by their sagitta.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
-from planning.feasibility.blocking import FRAGILE, Decision, decisions
+from planning.feasibility.blocking import COARSE, FRAGILE, Decision, decisions
 from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
 from planning.feasibility.envelope import PLANE, Envelope, Faces, envelope
 from planning.feasibility.face_pairs import heights_over
@@ -29,6 +29,8 @@ from planning.feasibility.solids import Solid
 # rounding of mesh files, below any overlap that matters: the decisions for the motor unit stay the
 # same from 1e-7 to 5e-4 m.
 FIT_TOLERANCE = 5e-5
+
+MANY = 1000  # Faces of a part; fewer are not worth simplifying.
 
 
 @dataclass(frozen=True)
@@ -75,7 +77,9 @@ class Interference:
 
 
 def interference(
-    solids: Sequence[Solid], tolerance: float | np.ndarray = FIT_TOLERANCE
+    solids: Sequence[Solid],
+    tolerance: float | np.ndarray = FIT_TOLERANCE,
+    tell: Callable[[int], None] = lambda done: None,
 ) -> Interference:
     """Return the six matrices M_j of n parts in matrix order.
 
@@ -83,23 +87,52 @@ def interference(
         solids: The parts.
         tolerance: Height of overlap and radius of the region that do not count [m]; one for all, or
             (n, n), symmetric, one per pair.
+        tell: Is told how many pairs have been decided, each once along every axis.
     """
     count = len(solids)
     tolerances = np.broadcast_to(tolerance, (count, count))
     free = {j: 1 - np.eye(count, dtype=int) for j in DIRECTIONS}
     margin = {j: FRAGILE * tolerances for j in DIRECTIONS}
     blockers = []
+    levels = [float(level) for level in np.unique(tolerances)]
+    coarse = {level: _coarser(solids, level) for level in levels}
+    done = 0
     for forward in ("+x", "+y", "+z"):
         views = [envelope(solid, axis_index(forward)) for solid in solids]
-        for level in np.unique(tolerances):
-            decided = decisions(views, float(level), tolerances == level)
+        for level in levels:
+            wanted = (tolerances == level) & ~np.eye(count, dtype=bool)
+            decided = decisions(
+                views,
+                level,
+                [envelope(solid, axis_index(forward)) for solid in coarse[level]],
+                wanted=wanted,
+                tell=lambda now, before=done: tell((before + now) // 2),
+            )
+            done += int(np.count_nonzero(wanted))
             for (i, k), decision in decided.items():
                 blocked = decision.point is not None
                 margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin
                 free[forward][i, k] = free[opposite(forward)][k, i] = int(not blocked)
-            for hit in evidence_of_hits(views, forward, decided, float(level)):
+            for hit in evidence_of_hits(views, forward, decided, level):
                 blockers += [hit, hit.reversed()]
     return Interference(free, tuple(blockers), margin)
+
+
+def _finer(solid: Solid, tolerance: float) -> bool:
+    """Return whether most faces of a part of many are smaller than a disc of the tolerance."""
+    areas = np.linalg.norm(solid.doubled_areas, axis=1) / 2.0
+    return len(areas) > MANY and float(np.median(areas)) < np.pi * tolerance**2
+
+
+def _coarser(solids: Sequence[Solid], tolerance: float) -> list[Solid]:
+    """Return parts with as few faces as the tolerance allows; none if all of them are coarse."""
+    fine = [_finer(solid, tolerance) for solid in solids]
+    if not any(fine):
+        return []
+    return [
+        solid.simplified(COARSE * tolerance) if finer else solid
+        for solid, finer in zip(solids, fine, strict=True)
+    ]
 
 
 def first_hit(

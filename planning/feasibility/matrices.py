@@ -11,7 +11,7 @@ P_t displaced along j, flips every sign and contradicts the paper's table.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -29,6 +29,9 @@ from planning.feasibility.tolerance import Tolerances, connecting, tolerances_of
 from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
 
 SAME_WAY = 0.9998  # Cosine of 1 degree.
+
+Progress = Callable[[int, int], None]
+"""Is told how many comparisons of two parts have been made, of how many."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,7 +79,10 @@ class AssemblyMatrices:
 
 
 def matrices_of(
-    product: Product, tolerance: float | None = None, solids: Mapping[str, Solid] | None = None
+    product: Product,
+    tolerance: float | None = None,
+    solids: Mapping[str, Solid] | None = None,
+    progress: Progress = lambda done, total: None,
 ) -> AssemblyMatrices:
     """Compute the matrices of a product.
 
@@ -86,14 +92,18 @@ def matrices_of(
             None for the product's own, or those derived from its sizes and clearances if it
             declares none.
         solids: The product's parts, if they have been built already.
+        progress: Each pair counts four times: its distance, and its motions along three axes.
     """
     solids = solids_of(product) if solids is None else solids
     declared = product.contact_tolerance if tolerance is None else tolerance
     source = "declared by the product" if tolerance is None else "as given"
     parts, names = list(solids.values()), list(solids)
-    tolerances, gaps = tolerances_of(parts, declared, source)
+    every = len(parts) * (len(parts) - 1) // 2
+    tolerances, gaps = tolerances_of(
+        parts, declared, source, lambda done: progress(done, 4 * every)
+    )
     overlap = tolerances.overlaps(names)
-    leaving = interference(parts, overlap)
+    leaving = interference(parts, overlap, lambda done: progress(every + done, 4 * every))
     # Pairs that may overlap by more than the tolerance: their surfaces meet, and neither leaves the
     # other with a margin to spare. A layer of overlap between one and two tolerances thick is too
     # narrow to block across it, but only just.

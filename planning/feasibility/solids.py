@@ -94,9 +94,18 @@ class Solid:
 
     def without(self, other: Solid) -> Solid:
         """Return this part with the other's volume cut out; mass and p_AoG stay."""
-        mesh = (self.manifold - other.manifold).to_mesh64()
-        vertices = np.array(mesh.vert_properties)[:, :3]
-        return Solid(self.name, vertices, np.array(mesh.tri_verts, int), self.mass, self.p_AoG)
+        return self._shaped(self.manifold - other.manifold)
+
+    def simplified(self, deviation: float) -> Solid:
+        """Return this part with fewer faces, which lie within a deviation [m] of its own."""
+        return self._shaped(self.manifold.simplify(deviation))
+
+    def _shaped(self, manifold: manifold3d.Manifold) -> Solid:
+        mesh = manifold.to_mesh64()
+        vertices, faces = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts, int)
+        shaped = Solid(self.name, vertices, faces, self.mass, self.p_AoG)
+        vars(shaped)["manifold"] = manifold  # It need not be built from the mesh again.
+        return shaped
 
 
 def surface_of(triangles: np.ndarray) -> fcl.CollisionObject:

@@ -13,7 +13,7 @@ is plausible as the clearance of a fit. The overlap stays as it is.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -72,7 +72,10 @@ class Tolerances:
 
 
 def tolerances_of(
-    solids: Sequence[Solid], given: float | None, source: str
+    solids: Sequence[Solid],
+    given: float | None,
+    source: str,
+    tell: Callable[[int], None] = lambda done: None,
 ) -> tuple[Tolerances, np.ndarray]:
     """Return the tolerances of a product, and the gaps between its parts.
 
@@ -80,14 +83,16 @@ def tolerances_of(
         solids: The n parts.
         given: One length for both [m]; None to derive them.
         source: Who gave it.
+        tell: Is told how many pairs have been measured.
 
     Returns:
         The tolerances, and the gaps (n, n) as ``gap_matrix`` returns them [m], at least up to
         (1 + ``FRAGILE``) times the contact tolerance.
     """
     if given is not None:
-        return Tolerances(given, given, source), gap_matrix(solids, (1.0 + FRAGILE) * given)
-    gaps = gap_matrix(solids, (1.0 + FRAGILE) * USUAL)
+        gaps = gap_matrix(solids, (1.0 + FRAGILE) * given, tell=tell)
+        return Tolerances(given, given, source), gaps
+    gaps = gap_matrix(solids, (1.0 + FRAGILE) * USUAL, tell=tell)
     return _derived(solids, gaps), gaps
 
 
