@@ -8,9 +8,9 @@ plan fails; nothing is decided by it.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from planning.feasibility.solids import Solid
 
@@ -30,10 +30,10 @@ def pose_doubt(
         overlapping: Names of parts that share volume, undeclared.
     """
     start = "the parts are probably not in their assembled poses: "
-    for a, b in combinations(solids, 2):
-        equal = len(a.faces) == len(b.faces) and abs(a.mass - b.mass) <= 1e-6 * a.mass
-        apart = max(np.abs(a.lower - b.lower).max(), np.abs(a.upper - b.upper).max())
-        if equal and apart <= SAME_PLACE:
+    boxes = np.array([[*solid.lower, *solid.upper] for solid in solids])
+    for i, k in sorted(KDTree(boxes).query_pairs(SAME_PLACE, p=np.inf)):
+        a, b = solids[i], solids[k]
+        if len(a.faces) == len(b.faces) and abs(a.mass - b.mass) <= 1e-6 * a.mass:
             return f"{start}{a.name} and {b.name} are equal and in the same place"
     if overlapping and len(solids) > 2 and (point := _common_point(solids)):
         return f"{start}{point}, and {len(overlapping)} pairs overlap"

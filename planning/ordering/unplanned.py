@@ -42,11 +42,12 @@ def stray_items(
         names: Items that are to be planned.
         matrices: Of all parts.
     """
-    touching = matrices.contact + matrices.contact.T
-    place = {name: number for number, name in enumerate(matrices.solids)}
-    parts = [[place[part] for part in product.members(name)] for name in names]
-    graph = np.array([[touching[np.ix_(a, b)].any() for b in parts] for a in parts], bool)
-    count, labels = connected_components(graph, directed=False)
+    parts = [matrices.indices(product.members(name)) for name in names]
+    member = np.zeros((len(names), len(matrices.solids)))
+    for item, own in enumerate(parts):
+        member[item, own] = 1.0
+    touching = matrices.contact + matrices.contact.T + np.eye(len(matrices.contact))
+    count, labels = connected_components(member @ touching @ member.T > 0.0, directed=False)
     if count <= 1:
         return ()
     islands = [np.flatnonzero(labels == label).tolist() for label in range(count)]
