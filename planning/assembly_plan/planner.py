@@ -147,7 +147,10 @@ def plan(
         chosen, steps, stop = search.given(asked, () if order else items)
     contact, leaving = matrices.contact, matrices.interference
     stages = (*(step for built in search.built for step in built.steps), *steps, stop)
-    doubtful = stop is not None or bool(unplanned)
+    cause = ""
+    if stop is not None or unplanned:
+        errors = [(one.part, one.other) for one in matrices.errors]
+        cause = pose_doubt(list(matrices.solids.values()), contact, errors)
     return FixingPlan(
         product=product.name,
         order=chosen,
@@ -167,7 +170,7 @@ def plan(
         slanted=search.ways.slanted,
         subassemblies=tuple(search.built),
         unplanned=unplanned,
-        likely_cause=pose_doubt(list(matrices.solids.values()), contact) if doubtful else "",
+        likely_cause=cause,
     )
 
 
