@@ -345,4 +345,4 @@ def test_progress_counts_every_comparison_of_two_parts():
     matrices_of(product, progress=lambda done, total: told.append((done, total)))
     assert told and {total for _, total in told} == {4 * 3}
     counts = [done for done, _ in told]
-    assert counts == sorted(counts) and 0 <= counts[0] and counts[-1] < 4 * 3
+    assert counts == sorted(counts) and counts[0] >= 0 and counts[-1] < 4 * 3
