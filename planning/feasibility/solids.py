@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import fcl
@@ -98,7 +98,9 @@ class Solid:
 
     def simplified(self, deviation: float) -> Solid:
         """Return this part with fewer faces, which lie within a deviation [m] of its own."""
-        return self._shaped(self.manifold.simplify(deviation))
+        # A manifold that is built for this alone is not kept: it is larger than the mesh.
+        whole = self if "manifold" in vars(self) else replace(self)
+        return self._shaped(whole.manifold.simplify(deviation))
 
     def _shaped(self, manifold: manifold3d.Manifold) -> Solid:
         mesh = manifold.to_mesh64()
