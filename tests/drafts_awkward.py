@@ -138,7 +138,7 @@ def tiny_beside_large(rng: Rng) -> Draft:
     draft.shapes |= {"ring": ring, "shaft": shaft - pin, "grub": pin}
     draft.pair("grub", "shaft", "+z", touch=True)
     draft.pair("shaft", "ring", "+z -z", touch=True)
-    draft.pair("grub", "ring", "+z " + SIDEWAYS, touch=False)
+    draft.pair("grub", "ring", "+z -z " + SIDEWAYS, touch=False)
     return draft
 
 

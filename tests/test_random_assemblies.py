@@ -10,6 +10,7 @@ import pytest
 from random_assemblies import Assembly, Known, assemblies, cube_maps, mapped, turned
 
 from cell.errors import InputError
+from cell.products.declared import Declared
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.matrices import AssemblyMatrices, matrices_of
@@ -50,9 +51,19 @@ def disagreements(one: Assembly) -> list[str]:
     assert made.matrices is not None
     success = known.feasible and not known.press and not known.snap
     found = [] if made.feasible == success else [f"feasible: {made.feasible}"]
-    return found + wrong_contacts(made, known) + wrong_motions(made, known) + wrong_threads(
-        made.matrices, known
-    ) + wrong_overlaps(made.matrices, known)  # fmt: skip
+    if known.press or known.snap:
+        declared = Declared(press=known.press, snap=known.snap)
+        feasible_then = plan(replace(one.product, declared=declared)).feasible
+        found += [] if feasible_then == known.feasible else [f"as declared: {feasible_then}"]
+    strays = {item.name for item in made.unplanned if "touches no part" in item.reason}
+    return [
+        *found,
+        *(f"stray: {name}" for name in strays ^ known.strays),
+        *wrong_contacts(made, known),
+        *wrong_motions(made, known),
+        *wrong_threads(made.matrices, known),
+        *wrong_overlaps(made.matrices, known),
+    ]
 
 
 def wrong_contacts(made: FixingPlan, known: Known) -> list[str]:
@@ -146,7 +157,7 @@ def test_an_answer_that_is_wrong_is_noticed():
         one = everything()[kind][0]
         known = one.known
         assert not disagreements(one)
-        wrong = [replace(known, feasible=not known.feasible)] if not known.snap else []
+        wrong = [replace(known, feasible=not known.feasible)]
         wrong += [
             replace(known, touching=known.touching ^ {frozenset(list(one.product.parts)[:2])})
         ]

@@ -12,7 +12,11 @@ import numpy as np
 from cell.configuration.config import CellConfig
 from cell.errors import InputError, UnknownName
 from cell.products.product import Product
-from planning.assembly_plan.order_search import AssemblyLine, OrderSearch, named_subassemblies
+from planning.assembly_plan.order_search import (
+    AssemblyLine,
+    named_subassemblies,
+)
+from planning.assembly_plan.ordered import OrderTask
 from planning.feasibility.algorithm import FixingStep, Stop
 from planning.feasibility.cache import cached_matrices
 from planning.feasibility.directions import DIRECTIONS
@@ -30,7 +34,7 @@ from planning.feasibility.pose_doubt import pose_doubt
 from planning.feasibility.slanted import Slanted
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.ordering.advice import OrderAdvice, with_groups
-from planning.ordering.unplanned import Unplanned, overlapping_items, stray_items
+from planning.ordering.unplanned import Unplanned
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,7 +126,7 @@ def plan(
 
     Raises:
         UnknownName, BadOrder: The order does not list the product's parts once each.
-        InputError: Parts overlap, or the product cannot be used.
+        InputError: The product cannot be used.
 
     An order that is well formed but infeasible is a result, not an error: see ``FixingPlan.stop``.
     """
@@ -136,15 +140,12 @@ def plan(
     else:
         matrices = cached_matrices(product, tolerance, cache, progress)
     asked = order or (product.orders[0] if product.orders else None)
-    unplanned = _unplanned(whole, asked or product.items(), matrices)
-    left_out = {item.name for item in unplanned}
-    items = tuple(name for name in product.items() if name not in left_out)
-    search = OrderSearch(whole, matrices, setup, groups)
-    if asked is None:
-        chosen, steps, stop = search.free(items)
-    else:
-        asked = tuple(name for name in asked if name not in left_out)
-        chosen, steps, stop = search.given(asked, () if order else items)
+    task = OrderTask(whole, asked, product.items(), order is None, setup, groups)
+    ordered = task.ordered(matrices)
+    if tolerance is None and product.contact_tolerance is None:
+        ordered = task.with_play(ordered)
+    matrices, search, unplanned = ordered.matrices, ordered.search, ordered.unplanned
+    chosen, steps, stop = ordered.result
     contact, leaving = matrices.contact, matrices.interference
     stages = (*(step for built in search.built for step in built.steps), *steps, stop)
     cause = ""
@@ -172,19 +173,6 @@ def plan(
         unplanned=unplanned,
         likely_cause=cause,
     )
-
-
-def _unplanned(
-    product: Product, names: tuple[str, ...], matrices: AssemblyMatrices
-) -> tuple[Unplanned, ...]:
-    """Return the items that cannot be planned: they overlap others, or touch none of the rest."""
-    item_of = {part: name for name in names for part in product.members(name)}
-    mass = {name: sum(product.parts[p].mass for p in product.members(name)) for name in names}
-    errors = [(one.part, one.other, one.depth) for one in matrices.errors]
-    overlapping = overlapping_items(errors, item_of, mass)
-    refused = {item.name for item in overlapping}
-    rest = [name for name in names if name not in refused]
-    return (*overlapping, *stray_items(product, rest, matrices))
 
 
 def _validate(product: Product, order: tuple[str, ...] | None) -> None:

@@ -43,6 +43,8 @@ FIRST_TURN = (1, 2, 3, 5, 7, 10, 13, 17, 20, 24)  # Steps of 15 degrees.
 WAY_OUT = 32  # Further places of the bolt on its way out, spread over all angles.
 GOLDEN = 0.618  # Its multiples, less whole numbers, are spread evenly.
 ALIGNED = 1e-3  # Sine of 0.06 degrees to an axis of A: what facets do to a fit, 3e-4 [M].
+OPEN = 0.9  # [A] Of a bore's radius: where it is open within this, it goes on.
+FILM = 1e-6  # [m] Above the rounding of mesh files, below any tolerance.
 ROUND = 96  # Facets of what is cut out of a nut.
 
 
@@ -128,14 +130,15 @@ def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
         The nut without the turns of its thread, from the engaged ones on in the direction in which
         the bolt turns out, or all of them if it turns out both ways. What lies further in or
         further out than the thread stays, and so do steps and caps on the other side. Of a thread
-        drawn as overlapping cylinders, only the overlap is cut.
+        drawn as overlapping cylinders, the overlap is cut, and the rest of its bore is widened as
+        if it were tapped from end to end: a set screw lies deep in its hole.
     """
-    if thread.pitch is None:
-        return nut.without(bolt)
-    axis, middle = np.array(thread.axis), np.array(thread.p_AoT)
     far = float(
         np.linalg.norm(np.maximum(nut.upper, bolt.upper) - np.minimum(nut.lower, bolt.lower))
     )
+    if thread.pitch is None:
+        return _tapped(nut.without(bolt), thread, far)
+    axis, middle = np.array(thread.axis), np.array(thread.p_AoT)
     start = -far if thread.both_ways else -thread.length / 2.0
     # Half a height wider than the teeth, so that no slivers of them are left.
     outer = (thread.diameter + thread.height) / 2.0 / np.cos(np.pi / ROUND)
@@ -143,6 +146,26 @@ def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
     tube, bore = (manifold3d.Manifold.cylinder(far - start, r, r, ROUND) for r in (outer, inner))
     zone = (tube - bore).translate([0.0, 0.0, start]).transform(np.c_[_frame(axis), middle])
     mesh = (nut.manifold - zone).to_mesh64()
+    vertices = np.array(mesh.vert_properties)[:, :3]
+    return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
+
+
+def _tapped(nut: Solid, thread: CadThread, far: float) -> Solid:
+    """Return a nut whose bore has the thread's outer diameter as far as it is open, at most far."""
+    axis, middle = np.array(thread.axis), np.array(thread.p_AoT)
+    outer = thread.diameter / 2.0 / np.cos(np.pi / ROUND)
+    inner = OPEN * (thread.diameter / 2.0 - thread.height)
+    shape = nut.manifold
+    for sign in (1.0, -1.0):
+        frame = np.c_[_frame(sign * axis), middle]
+        bore = manifold3d.Manifold.cylinder(far, inner, inner, ROUND).transform(frame)
+        inside = np.array((shape ^ bore).to_mesh64().vert_properties)[:, :3]
+        along = sign * (inside - middle) @ axis
+        # A film of rounding at the end of the engaged thread does not close the bore.
+        along = along[along > thread.length / 2.0 + FILM]
+        end = float(along.min(initial=far))
+        shape -= manifold3d.Manifold.cylinder(end, outer, outer, ROUND).transform(frame)
+    mesh = shape.to_mesh64()
     vertices = np.array(mesh.vert_properties)[:, :3]
     return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
 

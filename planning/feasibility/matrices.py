@@ -19,13 +19,19 @@ import numpy as np
 from cell.products.product import Product
 from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
-from planning.feasibility.contact import contact_matrix
+from planning.feasibility.contact import contact_matrix, gap_matrix
 from planning.feasibility.directions import DIRECTIONS, opposite, unit_vector
 from planning.feasibility.helical_threads import helical_threads, unthreaded
 from planning.feasibility.interference import Blocker, Interference, interference
 from planning.feasibility.overlaps import Overlap, Overlaps, find_overlaps, fitted_pair
 from planning.feasibility.solids import Solid, solids_of
-from planning.feasibility.tolerance import Tolerances, connecting, tolerances_of
+from planning.feasibility.tolerance import (
+    LARGEST_FIT,
+    PER_FIT,
+    Tolerances,
+    connecting,
+    tolerances_of,
+)
 from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
 
 SAME_WAY = 0.9998  # Cosine of 1 degree.
@@ -132,6 +138,32 @@ def matrices_of(
     contact = contact_matrix(gaps, touch)
     margin = np.minimum(np.abs(gaps - touch), FRAGILE * touch)
     return AssemblyMatrices(solids, tolerances, contact, margin, leaving, overlaps, undercuts)
+
+
+def looser_contact(matrices: AssemblyMatrices) -> AssemblyMatrices | None:
+    """Return matrices with the next larger gap counted as contact; None if none is plausible."""
+    parts, names = list(matrices.solids.values()), list(matrices.solids)
+    tolerances = matrices.tolerances
+    touching = matrices.contact + matrices.contact.T > 0
+    gaps = np.where(touching, 0.0, gap_matrix(parts, LARGEST_FIT))
+    larger = gaps[(gaps > tolerances.contacts(names)) & np.isfinite(gaps)]
+    if not len(larger):
+        return None
+    gap = float(larger.min())
+    i, k = (int(index) for index in np.argwhere(gaps == gap)[0])
+    source = (
+        f"{tolerances.source.split(';')[0]}; there is an order only if parts with a clearance of "
+        f"{1e3 * gap:.3g} mm count as touching ({names[i]}, {names[k]})"
+    )
+    looser = replace(tolerances, contact=max(PER_FIT * gap, tolerances.contact), source=source)
+    touch = looser.contacts(names)
+    margin = np.minimum(np.abs(gaps - touch), FRAGILE * touch)
+    return replace(
+        matrices,
+        tolerances=looser,
+        contact=contact_matrix(gaps, touch),
+        contact_margin=margin,
+    )
 
 
 def fitted_pairs(

@@ -57,10 +57,13 @@ def stray_items(
     if len(islands[largest]) == 1:
         return ()
     rest = [solids[p] for i in islands[largest] for p in parts[i]]
+    wanted = {p for own in parts for p in own}
     found = {}
     for island in (island for n, island in enumerate(islands) if n != largest):
         for i in island:
             others = [names[k] for k in island if k != i]
+            beside = np.flatnonzero(touching[parts[i]].any(axis=0))
+            others += [solids[p].name for p in beside if p not in wanted]
             own = [solids[p] for p in parts[i]]
             found[i] = Unplanned(names[i], _stray_reason(others, *nearest(own, rest)))
     return tuple(found[i] for i in sorted(found))
