@@ -33,8 +33,7 @@ from planning.feasibility.face_pairs import (
 # Of the tolerance: a decision with less margin than this is reported. [D] Seen edge on, a layer of
 # overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
-COARSE = 0.2  # [A] Tolerances: blocked at 1.9 tolerances if so seen, and 1.5 are asked for.
-HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um, or to 6 um.
+HALVINGS = 3  # Bisects the 0.025 mm in which a fragile decision flips to 3 um.
 
 HEAD = 24  # Widest faces of each part that the second round uses, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
@@ -42,7 +41,7 @@ SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
 FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
-PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
+PROBES = 4  # Faces of a finely tessellated part over which is looked before all are compared.
 ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
 SEEDS, NEAR = 4, 2.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
@@ -63,8 +62,8 @@ class Decision:
 def decisions(
     views: Sequence[Envelope],
     tolerance: float,
-    coarse: Sequence[Envelope] = (),
     *,
+    simplified: bool = False,
     wanted: np.ndarray | None = None,
     tell: Callable[[int], None] = lambda done: None,
 ) -> dict[tuple[int, int], Decision]:
@@ -73,9 +72,9 @@ def decisions(
     Args:
         views: The n parts' envelopes along one axis.
         tolerance: Height of overlap and radius of the region that do not count [m].
+        simplified: Whether faces are as large as the tolerance allows; then all of them are
+            compared without probing.
         wanted: (n, n) bool: pairs to decide, none of them on the diagonal; None for all.
-        coarse: Envelopes of surfaces that lie within ``COARSE`` tolerances of the parts', with far
-            fewer faces; they settle most blocked pairs. None if the parts are coarse already.
         tell: Is told how many ordered pairs have been decided.
 
     Pairs left out are free, by a margin of at least ``FRAGILE`` times the tolerance.
@@ -83,10 +82,8 @@ def decisions(
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     pairs = _meeting_boxes(views, less)
     pairs = pairs if wanted is None else pairs[wanted[pairs[:, 0], pairs[:, 1]]]
-    hits = _coarse_hits(coarse, pairs, more + 2.0 * COARSE * tolerance) if coarse else {}
-    hits |= _wide_hits(views, _without(pairs, hits), more)
-    if not coarse:
-        hits |= _probed(views, pairs, hits, more)
+    hits = _wide_hits(views, pairs, more)
+    hits |= {} if simplified else _probed(views, pairs, hits, more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
@@ -99,27 +96,9 @@ def decisions(
         group[i, k] = crossing_faces(views[i].down, views[k].up, less)
         held += len(group[i, k])
         if held > GROUP:
-            found |= _decided(group, tolerance, quick=not coarse)
+            found |= _decided(group, tolerance)
             group, held = {}, 0
-    return found | _decided(group, tolerance, quick=not coarse)
-
-
-def _without(pairs: np.ndarray, known: Mapping[tuple[int, int], np.ndarray]) -> np.ndarray:
-    """Return the pairs (p, 2) that are not known yet."""
-    return pairs[[(int(i), int(k)) not in known for i, k in pairs]]
-
-
-def _coarse_hits(
-    views: Sequence[Envelope], pairs: np.ndarray, tolerance: float
-) -> dict[tuple[int, int], np.ndarray]:
-    """Return a blocked point (2,) for each pair that is easily seen to be blocked."""
-    hits = _wide_hits(views, pairs, tolerance)
-    hits |= _probed(views, pairs, hits, tolerance)
-    for i, k in ((int(i), int(k)) for i, k in _without(pairs, hits)):
-        crossing = crossing_faces(views[i].down, views[k].up, tolerance)
-        if len(crossing):
-            hits |= _region_hits({(i, k): crossing}, tolerance)
-    return hits
+    return found | _decided(group, tolerance)
 
 
 def _probed(
@@ -227,18 +206,12 @@ def _widest_rectangles(
 
 
 def _decided(
-    group: dict[tuple[int, int], FacePairs], tolerance: float, *, quick: bool
+    group: dict[tuple[int, int], FacePairs], tolerance: float
 ) -> dict[tuple[int, int], Decision]:
-    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance.
-
-    Args:
-        group: These faces.
-        tolerance: Height of overlap and radius of the region that do not count [m].
-        quick: Whether a few faces are tried before all; not worth it if coarse ones were.
-    """
+    """Decide pairs of parts from all their faces that can hit each other at the lower tolerance."""
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
     group = {parts: pairs for parts, pairs in group.items() if len(pairs)}
-    hits = _region_hits(group, more) if quick else {}
+    hits = _region_hits(group, more)
     found = {parts: Decision(point, FRAGILE * tolerance) for parts, point in hits.items()}
     for parts, pairs in group.items():
         if parts in found:
@@ -312,7 +285,7 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     point = _blocked_point(pairs, tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
-    for _ in range(HALVINGS if len(pairs) < BATCH else HALVINGS // 2):
+    for _ in range(HALVINGS):
         middle = (same + flipped) / 2
         changed = _blocked_point(pairs, tolerance + middle * step)
         if (changed is None) == (point is None):

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from planning.feasibility.blocking import COARSE, FRAGILE, Decision, decisions
+from planning.feasibility.blocking import FRAGILE, Decision, decisions
 from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
 from planning.feasibility.envelope import PLANE, Envelope, Faces, envelope
 from planning.feasibility.face_pairs import heights_over
@@ -30,6 +30,7 @@ from planning.feasibility.solids import Solid
 # same from 1e-7 to 5e-4 m.
 FIT_TOLERANCE = 5e-5
 
+COARSE = 0.1  # [A] Of the tolerance, as STEP is tessellated: far from where a decision flips.
 MANY = 1000  # Faces of a part; fewer are not worth simplifying.
 
 
@@ -95,16 +96,18 @@ def interference(
     margin = {j: FRAGILE * tolerances for j in DIRECTIONS}
     blockers = []
     levels = [float(level) for level in np.unique(tolerances)]
-    coarse = {level: _coarser(solids, level) for level in levels}
+    shapes = {level: [_coarser(solid, level) for solid in solids] for level in levels}
     done = 0
     for forward in ("+x", "+y", "+z"):
-        views = [envelope(solid, axis_index(forward)) for solid in solids]
+        axis = axis_index(forward)
+        own = {solid: envelope(solid, axis) for solid in solids}
         for level in levels:
+            views = [own.get(shape) or envelope(shape, axis) for shape in shapes[level]]
             wanted = (tolerances == level) & ~np.eye(count, dtype=bool)
             decided = decisions(
                 views,
                 level,
-                [envelope(solid, axis_index(forward)) for solid in coarse[level]],
+                simplified=shapes[level] != list(solids),
                 wanted=wanted,
                 tell=lambda now, before=done: tell((before + now) // 2),
             )
@@ -118,21 +121,15 @@ def interference(
     return Interference(free, tuple(blockers), margin)
 
 
-def _finer(solid: Solid, tolerance: float) -> bool:
-    """Return whether most faces of a part of many are smaller than a disc of the tolerance."""
+def _coarser(solid: Solid, tolerance: float) -> Solid:
+    """Return a part with as few faces as the tolerance allows.
+
+    That is worth while if it has many, most of them smaller than a disc of the tolerance.
+    """
     areas = np.linalg.norm(solid.doubled_areas, axis=1) / 2.0
-    return len(areas) > MANY and float(np.median(areas)) < np.pi * tolerance**2
-
-
-def _coarser(solids: Sequence[Solid], tolerance: float) -> list[Solid]:
-    """Return parts with as few faces as the tolerance allows; none if all of them are coarse."""
-    fine = [_finer(solid, tolerance) for solid in solids]
-    if not any(fine):
-        return []
-    return [
-        solid.simplified(COARSE * tolerance) if finer else solid
-        for solid, finer in zip(solids, fine, strict=True)
-    ]
+    if len(areas) <= MANY or float(np.median(areas)) >= np.pi * tolerance**2:
+        return solid
+    return solid.simplified(COARSE * tolerance)
 
 
 def first_hit(
