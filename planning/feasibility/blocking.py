@@ -33,7 +33,7 @@ from planning.feasibility.face_pairs import (
 # Of the tolerance: a decision with less margin than this is reported. [D] Seen edge on, a layer of
 # overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
-HALVINGS = 3  # Bisects the 0.025 mm in which a fragile decision flips to 3 um.
+HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um, or to 6 um.
 
 HEAD = 24  # Widest faces of each part that the second round uses, up and down.
 TRIED = 6  # Widest common rectangles of two parts that the second round clips.
@@ -285,7 +285,7 @@ def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
     point = _blocked_point(pairs, tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
-    for _ in range(HALVINGS):
+    for _ in range(HALVINGS if len(pairs) < BATCH else HALVINGS // 2):
         middle = (same + flipped) / 2
         changed = _blocked_point(pairs, tolerance + middle * step)
         if (changed is None) == (point is None):
