@@ -155,7 +155,7 @@ def test_bodies_that_touch_along_an_edge_are_closed(tmp_path: Path) -> None:
     trimesh.util.concatenate(touching).export(tmp_path / "stack.stl")
     product = load_product(tmp_path, MM)
     assert product.parts["stack"].mesh.is_volume and product.left_out == ()
-    assert "stack holds 2 separate bodies; --split makes them parts" in product.notes
+    assert "stack holds 2 bodies, of which some touch; --split makes them parts" in product.notes
 
 
 def test_bodies_that_overlap_are_united_in_one_part(tmp_path: Path) -> None:
@@ -172,7 +172,7 @@ def test_objects_of_a_file_keep_their_names(tag: str, tmp_path: Path) -> None:
     two = CUBE.translate([50, 0, 0]) + CUBE.translate([80, 0, 0])
     shapes = {"left plate": SLAB, "pin": CUBE, "rest": two}
     write_obj(tmp_path / "all.obj", tag, shapes)
-    assert "all holds 4 separate bodies" in " ".join(load_product(tmp_path, MM).notes)
+    assert "all holds 4 bodies, of which some touch" in " ".join(load_product(tmp_path, MM).notes)
     split = load_product(tmp_path / "all.obj", ReadOptions("mm", split=True))
     assert list(split.parts) == ["left_plate", "pin", "rest_1", "rest_2"]
     assert 1e9 * split.parts["left_plate"].mesh.volume == pytest.approx(4000)

@@ -13,6 +13,7 @@ from cell.errors import InputError, UnknownName
 from cell.products.declared import declared_from
 from cell.products.product import Product
 from planning import plan
+from planning.assembly_plan.explain import overlap_text
 from planning.feasibility.contact import contact_matrix, gap_matrix
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.matrices import AssemblyMatrices, matrices_of
@@ -158,8 +159,12 @@ def test_a_declared_press_fit_is_planned_and_reported():
     assert 1e3 * one.depth == pytest.approx(0.1, abs=0.003)
 
 
-def test_an_undeclared_press_fit_is_not_feasible():
-    assert not plan(pressed(0.1)).feasible
+def test_an_undeclared_press_fit_is_not_feasible_and_recognised():
+    fixing = plan(pressed(0.1))
+    assert not fixing.feasible
+    assert [one.press_fit for one in fixing.overlaps] == [True]
+    assert "a press fit by its shape" in overlap_text(fixing)
+    assert "--press block,pin" in overlap_text(fixing)
 
 
 @pytest.mark.parametrize("accept", ["plate,key", "key,plate", "all"])

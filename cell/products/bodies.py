@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import manifold3d
 import numpy as np
@@ -72,6 +73,12 @@ class Bodies:
         united = union.to_mesh64()
         faces = np.array(united.tri_verts, int)
         return trimesh.Trimesh(np.array(united.vert_properties)[:, :3], faces, process=False), True
+
+    def touch(self) -> bool:
+        """Return whether any two bodies touch."""
+        solids = [_manifold(solid) for solid in self.solids]
+        near = 1e-6 * max(float(np.max(solid.extents)) for solid in self.solids)
+        return any(a.min_gap(b, 2.0 * near) <= near for a, b in combinations(solids, 2))
 
 
 def bodies_of(surface: trimesh.Trimesh) -> Bodies:

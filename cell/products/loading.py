@@ -230,16 +230,15 @@ def _tree(parts: Iterable[str], groups: Mapping[str, tuple[str, ...]]) -> list[s
 
 
 def _several(parts: Parts) -> list[str]:
-    """Return remarks on parts with several bodies, by their number."""
-    by_number: dict[tuple[int, bool], list[str]] = {}
-    for name, number in parts.several.items():
-        by_number.setdefault((number, name in parts.united), []).append(name)
-    remarks = []
-    for (number, united), names in by_number.items():
-        hold = "holds" if len(names) == 1 else "each hold"
-        what = "bodies that overlap, united" if united else "separate bodies"
-        remarks.append(f"{_listed(names)} {hold} {number} {what}; --split makes them parts")
-    return remarks
+    """Return remarks on parts with several bodies, by what is said of these."""
+    alike: dict[str, list[str]] = {}
+    for name, bodies in parts.several.items():
+        alike.setdefault(bodies, []).append(name)
+    return [
+        f"{_listed(names)} {'holds' if len(names) == 1 else 'each hold'} {bodies}; "
+        "--split makes them parts"
+        for bodies, names in alike.items()
+    ]
 
 
 def _sizes(meshes: Mapping[str, trimesh.Trimesh]) -> list[str]:

@@ -26,15 +26,13 @@ class Parts:
         meshes: Closed surfaces in the product frame A [m], by name.
         left_out: What is not planned.
         repairs: What was done to a part's surface, by name.
-        several: Number of bodies of parts that have more than one, by name.
-        united: Names of parts whose bodies overlapped and were united.
+        several: What is said of the bodies of parts that have more than one, by name.
     """
 
     meshes: dict[str, trimesh.Trimesh] = field(default_factory=dict)
     left_out: list[LeftOut] = field(default_factory=list)
     repairs: dict[str, str] = field(default_factory=dict)
-    several: dict[str, int] = field(default_factory=dict)
-    united: list[str] = field(default_factory=list)
+    several: dict[str, str] = field(default_factory=dict)
 
 
 def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Sequence[str]) -> Parts:
@@ -70,8 +68,12 @@ def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Seque
             if shape.bodies.repair:
                 parts.repairs[part] = shape.bodies.repair
         if not split and len(shape.bodies.solids) > 1:
-            parts.several[name] = len(shape.bodies.solids)
-            parts.united += [name] if shape.one[1] else []
+            number = len(shape.bodies.solids)
+            parts.several[name] = f"{number} separate bodies"
+            if shape.one[1]:
+                parts.several[name] = f"{number} bodies that overlap, united"
+            elif shape.touching:
+                parts.several[name] = f"{number} bodies, of which some touch"
     return parts
 
 
@@ -113,6 +115,11 @@ class _Shape:
     def one(self) -> tuple[trimesh.Trimesh, bool]:
         """All bodies as one surface, and whether they overlapped and were united."""
         return self.bodies.as_one()
+
+    @cached_property
+    def touching(self) -> bool:
+        """Whether any two bodies touch."""
+        return self.bodies.touch()
 
     def named(self, name: str, split: bool, taken: set[str]) -> list[tuple[str, trimesh.Trimesh]]:
         """Return the part, or its bodies, with names that are not taken, and are from now on."""

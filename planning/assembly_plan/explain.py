@@ -54,7 +54,14 @@ def stop_text(plan: FixingPlan) -> str:
         return "\n".join(lines)
     stop, target = plan.stop, subassembly_name(plan.order[: len(plan.steps) + 1])
     lines.append(f"Infeasible: {stop.item} cannot be added to {target}: {stop.reason}.")
-    return "\n".join(lines + [f"  {blocker_text(blocker)}" for blocker in stop.blockers])
+    lines += [f"  {blocker_text(blocker)}" for blocker in stop.blockers]
+    if stop.blockers:
+        pair = f"{stop.blockers[0].moving},{stop.blockers[0].staying}"
+        lines.append(
+            f"Parts count as rigid. What bends or stretches can be declared: --snap {pair} for a "
+            "snap fit, --flexible PART for a belt or a gasket."
+        )
+    return "\n".join(lines)
 
 
 def overlap_text(plan: FixingPlan) -> str:
@@ -65,15 +72,17 @@ def overlap_text(plan: FixingPlan) -> str:
     lines = [f"{len(plan.overlaps)} {pairs}, other than in a thread:"]
     lines += [
         f"  {one.part}, {one.other}: {1e3 * one.depth:.3g} mm deep at {point_text(one.p_AoD)}, "
-        f"{1e9 * one.volume:.3g} mm3"
+        f"{1e9 * one.volume:.3g} mm3{', a press fit by its shape' if one.press_fit else ''}"
         for one in plan.overlaps[:MOST_LISTED]
     ]
     more = len(plan.overlaps) - MOST_LISTED
     lines += [f"  ... and {more} more in plan.json"] if more > 0 else []
-    pair = f"{plan.overlaps[0].part},{plan.overlaps[0].other}"
+    fit = next((one for one in plan.overlaps if one.press_fit), plan.overlaps[0])
+    first = plan.overlaps[0]
     lines.append(
-        f"Correct poses or shapes, or declare what is meant: --press {pair} for a press fit, "
-        f"--accept {pair} to ignore it, --accept all to ignore all of them."
+        "Correct poses or shapes, or declare what is meant: "
+        f"--press {fit.part},{fit.other} for a press fit, "
+        f"--accept {first.part},{first.other} to ignore it, --accept all to ignore all of them."
     )
     return "\n".join(lines)
 

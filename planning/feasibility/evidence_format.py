@@ -31,6 +31,7 @@ def evidence_to_dict(evidence: Evidence) -> dict[str, Any]:
             "point_m": list(one.p_AoD),
             "volume_m3": one.volume,
             "kind": one.kind,
+            "press_fit": one.press_fit,
         }
         for one in evidence.overlaps
     ]
@@ -88,7 +89,8 @@ def evidence_from_dict(data: Mapping[str, Any]) -> Evidence:
     for one in data["overlaps"]:
         (part, other), (x, y, z) = one["parts"], one["point_m"]
         place = (x, y, z)
-        overlaps.append(Overlap(part, other, one["depth_m"], place, one["volume_m3"], one["kind"]))
+        lengths = one["depth_m"], place, one["volume_m3"]
+        overlaps.append(Overlap(part, other, *lengths, one["kind"], one["press_fit"]))
     undercuts = [
         Undercut(one["part"], one["other"], one["direction"], one["width_m"], one["kind"])
         for one in data["undercuts"]

@@ -17,7 +17,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.products.product import Product
-from planning.feasibility.cad_threads import THREAD_HEIGHT_PER_PITCH, CadThread, find_thread
+from planning.feasibility.cad_threads import (
+    THREAD_HEIGHT_PER_PITCH,
+    CadThread,
+    find_press_fit,
+    find_thread,
+)
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.facets import sagitta
 from planning.feasibility.helical_threads import find_helical_thread
@@ -39,6 +44,7 @@ class Overlap:
         volume: Common volume [m3].
         kind: "press" or "accept", as the user declared it; "facets" if it is no deeper than the
             facets of the two are coarse; "" if it is an error.
+        press_fit: Whether it has the shape of a pin with interference in its hole.
     """
 
     part: str
@@ -47,6 +53,7 @@ class Overlap:
     p_AoD: tuple[float, float, float]
     volume: float
     kind: str = ""
+    press_fit: bool = False
 
 
 @dataclass(frozen=True)
@@ -102,7 +109,8 @@ def find_overlaps(
         kind = declared or ("accept" if product.declared.accept_all else "")
         if not declared and found.depth <= _coarseness(solids[a], solids[b], found.depth):
             kind = "facets"
-        others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, kind))
+        press_fit = find_press_fit(*pair, tolerance) is not None
+        others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, kind, press_fit))
     return Overlaps(tuple(threads), tuple(screws), tuple(others))
 
 
