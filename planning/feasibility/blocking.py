@@ -41,7 +41,7 @@ SHARE = 1_000_000  # Bounds the memory of the second round to some 10 MB.
 FIRST = 32  # Widest pairs of faces of two parts that the third round clips first.
 BATCH = 8192  # Pairs of faces clipped at once: bounds the memory to some MB.
 GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
-PROBES = 4  # Faces of a finely tessellated part over which is looked before all are compared.
+PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
 ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
 SEEDS, NEAR = 4, 2.0  # Widest slivers, each merged with the slivers within this many tolerances.
 
