@@ -31,6 +31,7 @@ from planning.feasibility.solids import Solid
 FIT_TOLERANCE = 5e-5
 
 COARSE = 0.1  # [A] Of the tolerance, as STEP is tessellated: far from where a decision flips.
+HALF = 0.5  # [M] Of the faces: where fewer are left, all are compared sooner than probed.
 MANY = 1000  # Faces of a part; fewer are not worth simplifying.
 
 
@@ -107,7 +108,7 @@ def interference(
             decided = decisions(
                 views,
                 level,
-                simplified=shapes[level] != list(solids),
+                simplified=_faces(shapes[level]) < HALF * _faces(solids),
                 wanted=wanted,
                 tell=lambda now, before=done: tell((before + now) // 2),
             )
@@ -119,6 +120,10 @@ def interference(
             for hit in evidence_of_hits(views, forward, decided, level):
                 blockers += [hit, hit.reversed()]
     return Interference(free, tuple(blockers), margin)
+
+
+def _faces(solids: Sequence[Solid]) -> int:
+    return sum(len(solid.faces) for solid in solids)
 
 
 def _coarser(solid: Solid, tolerance: float) -> Solid:
