@@ -7,8 +7,7 @@ import pytest
 from manifold3d import Manifold, OpType
 from tiny_products import box, product_of, rod
 
-from planning.feasibility import blocking
-from planning.feasibility import interference as interference_file
+from planning.feasibility import blocking, coarse
 from planning.feasibility.cells import crossing_pairs, touching
 from planning.feasibility.envelope import Envelope, Faces, envelope
 from planning.feasibility.face_pairs import blocked_regions, overlapping_faces, paired
@@ -80,7 +79,7 @@ def test_fine_parts_that_block_each_other_are_settled_over_a_probe(monkeypatch):
         screw -= groove
     screw = screw.refine(3)
     plate = box((12.0, 12.0, 6.0), (-6.0, -6.0, 0.0)).refine(30) - screw
-    monkeypatch.setattr(interference_file, "MANY", 10**9)  # Nothing is simplified.
+    monkeypatch.setattr(coarse, "MANY", 10**9)  # Nothing is simplified.
     monkeypatch.setattr(blocking, "crossing_faces", lambda *_: pytest.fail("all were compared"))
     leaving = interference(list(solids_of(product_of({"screw": screw, "plate": plate})).values()))
     assert all(matrix.sum() == 0 for matrix in leaving.free.values())

@@ -8,7 +8,7 @@ from tiny_products import product_of
 
 from experiments.plan.gear_line import gear_line
 from planning import plan
-from planning.feasibility import interference as interference_file
+from planning.feasibility import coarse
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import interference
 from planning.feasibility.matrices import matrices_of
@@ -42,10 +42,10 @@ def test_a_cover_in_its_pillars_is_an_error():
 def test_simplified_surfaces_decide_like_the_parts_own(monkeypatch):
     """Parts are simplified first where the tolerance is far wider than their facets."""
     solids = list(solids_of(product_of(gear_line(1, fineness=0.5))).values())
-    simplified = [s.name for s in solids if interference_file._coarser(s, 1e-3) is not s]
+    simplified = [s.name for s in solids if coarse.coarsened(s, 1e-3) is not s]
     assert len(simplified) > 2
     quick = interference(solids, 1e-3)
-    monkeypatch.setattr(interference_file, "MANY", 10**9)
+    monkeypatch.setattr(coarse, "MANY", 10**9)
     thorough = interference(solids, 1e-3)
     for j in DIRECTIONS:
         np.testing.assert_array_equal(quick.free[j], thorough.free[j])

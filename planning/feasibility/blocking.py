@@ -33,6 +33,7 @@ from planning.feasibility.face_pairs import (
 # Of the tolerance: a decision with less margin than this is reported. [D] Seen edge on, a layer of
 # overlap as thick as the tolerance admits a disc of half the tolerance, and no larger.
 FRAGILE = 0.5
+ROUGHLY = 2  # [D] Halvings down to the eighth of a tolerance by which simplified surfaces are off.
 HALVINGS = 5  # Bisects the 0.025 mm in which a fragile decision flips to 0.8 um, or to 6 um.
 
 HEAD = 24  # Widest faces of each part that the second round uses, up and down.
@@ -85,6 +86,7 @@ def decisions(
     hits = _wide_hits(views, pairs, more)
     hits |= {} if simplified else _probed(views, pairs, hits, more)
     found = {pair: Decision(point, FRAGILE * tolerance) for pair, point in hits.items()}
+    halvings = ROUGHLY if simplified else HALVINGS
     group: dict[tuple[int, int], FacePairs] = {}
     held = 0
     total = len(views) * (len(views) - 1) if wanted is None else np.count_nonzero(wanted)
@@ -96,9 +98,9 @@ def decisions(
         group[i, k] = crossing_faces(views[i].down, views[k].up, less)
         held += len(group[i, k])
         if held > GROUP:
-            found |= _decided(group, tolerance)
+            found |= _decided(group, tolerance, halvings)
             group, held = {}, 0
-    return found | _decided(group, tolerance)
+    return found | _decided(group, tolerance, halvings)
 
 
 def _probed(
@@ -206,7 +208,7 @@ def _widest_rectangles(
 
 
 def _decided(
-    group: dict[tuple[int, int], FacePairs], tolerance: float
+    group: dict[tuple[int, int], FacePairs], tolerance: float, halvings: int
 ) -> dict[tuple[int, int], Decision]:
     """Decide pairs of parts from all their faces that can hit each other at the lower tolerance."""
     less, more = (1.0 - FRAGILE) * tolerance, (1.0 + FRAGILE) * tolerance
@@ -221,7 +223,7 @@ def _decided(
         elif (point := _blocked_point(pairs, more)) is not None:
             found[parts] = Decision(point, FRAGILE * tolerance)
         else:
-            found[parts] = _bisected(pairs, tolerance)
+            found[parts] = _bisected(pairs, tolerance, halvings)
     return found
 
 
@@ -280,12 +282,12 @@ def _clipped(
     }
 
 
-def _bisected(pairs: FacePairs, tolerance: float) -> Decision:
+def _bisected(pairs: FacePairs, tolerance: float, halvings: int) -> Decision:
     """Decide a pair of parts that is blocked at the lower tolerance and free at the higher."""
     point = _blocked_point(pairs, tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
-    for _ in range(HALVINGS if len(pairs) < BATCH else HALVINGS // 2):
+    for _ in range(halvings if len(pairs) < BATCH else halvings // 2):
         middle = (same + flipped) / 2
         changed = _blocked_point(pairs, tolerance + middle * step)
         if (changed is None) == (point is None):

@@ -20,6 +20,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from planning.feasibility.blocking import FRAGILE, Decision, decisions
+from planning.feasibility.coarse import coarsened
 from planning.feasibility.directions import DIRECTIONS, axis_index, opposite, unit_vector
 from planning.feasibility.envelope import PLANE, Envelope, Faces, envelope
 from planning.feasibility.face_pairs import heights_over
@@ -30,9 +31,7 @@ from planning.feasibility.solids import Solid
 # same from 1e-7 to 5e-4 m.
 FIT_TOLERANCE = 5e-5
 
-COARSE = 0.1  # [A] Of the tolerance, as STEP is tessellated: far from where a decision flips.
 HALF = 0.5  # [M] Of the faces: where fewer are left, all are compared sooner than probed.
-MANY = 1000  # Faces of a part; fewer are not worth simplifying.
 
 
 @dataclass(frozen=True)
@@ -97,7 +96,7 @@ def interference(
     margin = {j: FRAGILE * tolerances for j in DIRECTIONS}
     blockers = []
     levels = [float(level) for level in np.unique(tolerances)]
-    shapes = {level: [_coarser(solid, level) for solid in solids] for level in levels}
+    shapes = {level: [coarsened(solid, level) for solid in solids] for level in levels}
     done = 0
     for forward in ("+x", "+y", "+z"):
         axis = axis_index(forward)
@@ -124,17 +123,6 @@ def interference(
 
 def _faces(solids: Sequence[Solid]) -> int:
     return sum(len(solid.faces) for solid in solids)
-
-
-def _coarser(solid: Solid, tolerance: float) -> Solid:
-    """Return a part with as few faces as the tolerance allows.
-
-    That is worth while if it has many, most of them smaller than a disc of the tolerance.
-    """
-    areas = np.linalg.norm(solid.doubled_areas, axis=1) / 2.0
-    if len(areas) <= MANY or float(np.median(areas)) >= np.pi * tolerance**2:
-        return solid
-    return solid.simplified(COARSE * tolerance)
 
 
 def first_hit(

@@ -19,6 +19,7 @@ import numpy as np
 from cell.products.product import Product
 from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
+from planning.feasibility.coarse import COARSE
 from planning.feasibility.contact import contact_matrix, gap_matrix
 from planning.feasibility.directions import DIRECTIONS, opposite, unit_vector
 from planning.feasibility.helical_threads import helical_threads, unthreaded
@@ -34,6 +35,7 @@ from planning.feasibility.tolerance import (
 )
 from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
 
+MEETING = 2.0 * COARSE  # Of the tolerance.
 SAME_WAY = 0.9998  # Cosine of 1 degree.
 
 Progress = Callable[[int, int], None]
@@ -115,11 +117,12 @@ def matrices_of(
     # narrow to block across it, but only just.
     sure = FRAGILE * overlap * (1.0 - 1e-9)
     held = [(leaving.free[j] == 0) | (leaving.margin[j] < sure) for j in DIRECTIONS]
-    suspect = (gaps == 0.0) & np.all(held, axis=0)
+    # Surfaces that have been simplified may lie a little apart where those of the parts meet.
+    suspect = (gaps <= MEETING * overlap) & np.all(held, axis=0)
     suspects = [(names[i], names[k]) for i, k in np.argwhere(np.triu(suspect, 1))]
     overlaps = find_overlaps(product, solids, tolerances, suspects)
     locked = np.all([leaving.free[j] + leaving.free[j].T == 0 for j in DIRECTIONS], axis=0)
-    apart = [(parts[i], parts[k]) for i, k in np.argwhere(np.triu(locked & (gaps > 0.0), 1))]
+    apart = [(parts[i], parts[k]) for i, k in np.argwhere(np.triu(locked & ~suspect, 1))]
     turning = helical_threads(apart, tolerances.overlap)
     overlaps = replace(overlaps, threads=(*turning, *overlaps.threads))
     for thread in overlaps.threads:

@@ -98,9 +98,12 @@ class Solid:
 
     def simplified(self, deviation: float) -> Solid:
         """Return this part with fewer faces, which lie within a deviation [m] of its own."""
-        # A manifold that is built for this alone is not kept: it is larger than the mesh.
-        whole = self if "manifold" in vars(self) else replace(self)
-        return self._shaped(whole.manifold.simplify(deviation))
+        known: dict[float, Solid] = vars(self).setdefault("_simplified", {})
+        if deviation not in known:
+            # A manifold that is built for this alone is not kept: it is larger than the mesh.
+            whole = self if "manifold" in vars(self) else replace(self)
+            known[deviation] = self._shaped(whole.manifold.simplify(deviation))
+        return known[deviation]
 
     def _shaped(self, manifold: manifold3d.Manifold) -> Solid:
         mesh = manifold.to_mesh64()

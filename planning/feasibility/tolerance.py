@@ -21,6 +21,7 @@ from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components, minimum_spanning_tree
 
 from planning.feasibility.blocking import FRAGILE
+from planning.feasibility.coarse import coarsened
 from planning.feasibility.contact import gap_matrix
 from planning.feasibility.solids import Solid
 
@@ -90,7 +91,8 @@ def tolerances_of(
         (1 + ``FRAGILE``) times the contact tolerance.
     """
     if given is not None:
-        gaps = gap_matrix(solids, (1.0 + FRAGILE) * given, tell=tell)
+        coarse = [coarsened(solid, given) for solid in solids]
+        gaps = gap_matrix(coarse, (1.0 + FRAGILE) * given, tell=tell)
         return Tolerances(given, given, source), gaps
     gaps = gap_matrix(solids, (1.0 + FRAGILE) * USUAL, tell=tell)
     return _derived(solids, gaps), gaps
