@@ -137,7 +137,7 @@ def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
         np.linalg.norm(np.maximum(nut.upper, bolt.upper) - np.minimum(nut.lower, bolt.lower))
     )
     if thread.pitch is None:
-        return _tapped(nut.without(bolt), thread, far)
+        return _tapped(nut.without(bolt), bolt, thread, far)
     axis, middle = np.array(thread.axis), np.array(thread.p_AoT)
     start = -far if thread.both_ways else -thread.length / 2.0
     # Half a height wider than the teeth, so that no slivers of them are left.
@@ -150,21 +150,35 @@ def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
     return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
 
 
-def _tapped(nut: Solid, thread: CadThread, far: float) -> Solid:
-    """Return a nut whose bore has the thread's outer diameter as far as it is open, at most far."""
+def _tapped(nut: Solid, bolt: Solid, thread: CadThread, far: float) -> Solid:
+    """Return a nut whose bore has the thread's outer diameter as far as it is open, at most far.
+
+    That matters on the sides on which the bolt ends in the bore, unless its head keeps it from
+    leaving there.
+    """
     axis, middle = np.array(thread.axis), np.array(thread.p_AoT)
+    corners = bolt.vertices - middle
+    along, radii = corners @ axis, np.linalg.norm(np.cross(corners, axis), axis=1)
+    wide = radii > 1.02 * thread.diameter / 2.0
+    end = thread.length / 2.0 + FILM
+    ends_inside = [
+        sign
+        for sign in (1.0, -1.0)
+        if not (sign * along > end).any() and not (wide & (-sign * along > end)).any()
+    ]
+    if not ends_inside:
+        return nut
     outer = thread.diameter / 2.0 / np.cos(np.pi / ROUND)
     inner = OPEN * (thread.diameter / 2.0 - thread.height)
     shape = nut.manifold
-    for sign in (1.0, -1.0):
+    for sign in ends_inside:
         frame = np.c_[_frame(sign * axis), middle]
         bore = manifold3d.Manifold.cylinder(far, inner, inner, ROUND).transform(frame)
         inside = np.array((shape ^ bore).to_mesh64().vert_properties)[:, :3]
-        along = sign * (inside - middle) @ axis
+        depth = sign * (inside - middle) @ axis
         # A film of rounding at the end of the engaged thread does not close the bore.
-        along = along[along > thread.length / 2.0 + FILM]
-        end = float(along.min(initial=far))
-        shape -= manifold3d.Manifold.cylinder(end, outer, outer, ROUND).transform(frame)
+        open_to = float(depth[depth > end].min(initial=far))
+        shape -= manifold3d.Manifold.cylinder(open_to, outer, outer, ROUND).transform(frame)
     mesh = shape.to_mesh64()
     vertices = np.array(mesh.vert_properties)[:, :3]
     return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
