@@ -14,7 +14,8 @@ from dataclasses import dataclass
 
 from cell.products.product import Product
 from planning.feasibility.algorithm import FixingStep, Stop, Vector, configure_fixing
-from planning.feasibility.matrices import AssemblyMatrices, leaving_solids
+from planning.feasibility.fitting import fitted_solids
+from planning.feasibility.matrices import AssemblyMatrices
 from planning.feasibility.solids import Solid
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.ordering.advice import (
@@ -157,7 +158,8 @@ class OrderSearch:
     def _shapes(self) -> tuple[list[Solid], float, list[Vector]]:
         matrices = self.matrices
         axes = [thread.axis for thread in matrices.threads]
-        return list(leaving_solids(matrices).values()), matrices.tolerance, axes
+        solids, _ = fitted_solids(matrices.solids, matrices.overlaps, matrices.tolerances)
+        return list(solids.values()), matrices.tolerance, axes
 
     def _add(self, found: FurtherWays) -> bool:
         """Add directions to those known; return whether any are new."""

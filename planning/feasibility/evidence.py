@@ -16,8 +16,9 @@ from planning.feasibility.algorithm import FixingStep, Stop
 from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import opposite
+from planning.feasibility.fitting import fitted_solids
 from planning.feasibility.freedom import Freedom, freedoms
-from planning.feasibility.matrices import AssemblyMatrices, leaving_solids, reachable_directions
+from planning.feasibility.matrices import AssemblyMatrices, reachable_directions
 from planning.feasibility.overlaps import Overlap
 from planning.feasibility.tolerance import Tolerances
 from planning.feasibility.undercut import Undercut
@@ -118,7 +119,7 @@ def evidence_of(
 def _item_freedoms(
     matrices: AssemblyMatrices, steps: Sequence[FixingStep | Stop]
 ) -> Iterator[ItemFreedom]:
-    solids = leaving_solids(matrices)
+    solids, _ = fitted_solids(matrices.solids, matrices.overlaps, matrices.tolerances)
     for step in steps:
         incoming, target = ([solids[name] for name in ns] for ns in (step.incoming, step.target))
         axes = [thread.axis for thread in matrices.threads if thread.bolt in step.incoming]

@@ -81,6 +81,7 @@ def interference(
     solids: Sequence[Solid],
     tolerance: float | np.ndarray = FIT_TOLERANCE,
     tell: Callable[[int], None] = lambda done: None,
+    wanted: np.ndarray | None = None,
 ) -> Interference:
     """Return the six matrices M_j of n parts in matrix order.
 
@@ -89,6 +90,7 @@ def interference(
         tolerance: Height of overlap and radius of the region that do not count [m]; one for all, or
             (n, n), symmetric, one per pair.
         tell: Is told how many pairs have been decided, each once along every axis.
+        wanted: (n, n) bool, symmetric: pairs to decide, others count as free; None for all.
     """
     count = len(solids)
     tolerances = np.broadcast_to(tolerance, (count, count))
@@ -97,21 +99,22 @@ def interference(
     blockers = []
     levels = [float(level) for level in np.unique(tolerances)]
     shapes = {level: [coarsened(solid, level) for solid in solids] for level in levels}
-    done = 0
+    every, done = ~np.eye(count, dtype=bool), 0
+    every &= True if wanted is None else wanted
     for forward in ("+x", "+y", "+z"):
         axis = axis_index(forward)
         own = {solid: envelope(solid, axis) for solid in solids}
         for level in levels:
             views = [own.get(shape) or envelope(shape, axis) for shape in shapes[level]]
-            wanted = (tolerances == level) & ~np.eye(count, dtype=bool)
+            now = (tolerances == level) & every
             decided = decisions(
                 views,
                 level,
                 simplified=_faces(shapes[level]) < HALF * _faces(solids),
-                wanted=wanted,
-                tell=lambda now, before=done: tell((before + now) // 2),
+                wanted=now,
+                tell=lambda own, before=done: tell((before + own) // 2),
             )
-            done += int(np.count_nonzero(wanted))
+            done += int(np.count_nonzero(now))
             for (i, k), decision in decided.items():
                 blocked = decision.point is not None
                 margin[forward][i, k] = margin[opposite(forward)][k, i] = decision.margin

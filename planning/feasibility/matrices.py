@@ -21,10 +21,11 @@ from planning.feasibility.blocking import FRAGILE
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.coarse import COARSE
 from planning.feasibility.contact import contact_matrix, gap_matrix
-from planning.feasibility.directions import DIRECTIONS, opposite, unit_vector
-from planning.feasibility.helical_threads import helical_threads, unthreaded
+from planning.feasibility.directions import DIRECTIONS, opposite
+from planning.feasibility.fitting import refitted
+from planning.feasibility.helical_threads import helical_threads
 from planning.feasibility.interference import Blocker, Interference, interference
-from planning.feasibility.overlaps import Overlap, Overlaps, find_overlaps, fitted_pair
+from planning.feasibility.overlaps import Overlap, Overlaps, find_overlaps
 from planning.feasibility.solids import Solid, solids_of
 from planning.feasibility.tolerance import (
     LARGEST_FIT,
@@ -36,7 +37,6 @@ from planning.feasibility.tolerance import (
 from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
 
 MEETING = 2.0 * COARSE  # Of the tolerance.
-SAME_WAY = 0.9998  # Cosine of 1 degree.
 
 Progress = Callable[[int, int], None]
 """Is told how many comparisons of two parts have been made, of how many."""
@@ -130,8 +130,7 @@ def matrices_of(
         gaps[bolt, nut] = gaps[nut, bolt] = 0.0  # Flanks bear, whatever clearance is drawn.
     if declared is None:
         tolerances, gaps = connecting(tolerances, parts, gaps)
-    for pair in fitted_pairs(solids, overlaps, tolerances):
-        leaving = _redecided(leaving, names, pair, tolerances, overlaps.threads)
+    leaving = refitted(leaving, solids, overlaps, tolerances)
     undercuts = tuple(_undercuts(product, solids, leaving, tolerances.overlap))
     for one in undercuts:
         i, k = names.index(one.part), names.index(one.other)
@@ -167,74 +166,6 @@ def looser_contact(matrices: AssemblyMatrices) -> AssemblyMatrices | None:
         contact=contact_matrix(gaps, touch),
         contact_margin=margin,
     )
-
-
-def fitted_pairs(
-    solids: Mapping[str, Solid], overlaps: Overlaps, tolerances: Tolerances
-) -> Iterator[tuple[Solid, Solid]]:
-    """Yield each pair with an overlap that is meant, its common volume cut out of one of the two.
-
-    Args:
-        solids: Parts by name.
-        overlaps: Of the product.
-        tolerances: Of the product.
-    """
-    for thread in overlaps.threads:
-        bolt = solids[thread.bolt]
-        yield bolt, unthreaded(solids[thread.nut], bolt, thread)
-    for bolt, nut in overlaps.screws:
-        yield solids[bolt], solids[nut].without(solids[bolt])
-    for one in overlaps.others:
-        if one.kind:
-            tolerance = tolerances.overlap_of(one.part, one.other)
-            yield fitted_pair(solids[one.part], solids[one.other], tolerance)
-
-
-def leaving_solids(matrices: AssemblyMatrices) -> dict[str, Solid]:
-    """Return the parts as what leaves them sees them, without overlaps that are meant."""
-    solids = dict(matrices.solids)
-    for pair in fitted_pairs(solids, matrices.overlaps, matrices.tolerances):
-        solids |= {solid.name: solid for solid in pair}
-    return solids
-
-
-def _redecided(
-    leaving: Interference,
-    names: Sequence[str],
-    pair: tuple[Solid, Solid],
-    tolerances: Tolerances,
-    threads: Sequence[CadThread],
-) -> Interference:
-    """Decide the entries of two parts anew, whose shapes have been fitted to each other.
-
-    Against the axis of a thread that turns out one way only, they stay as they were.
-    """
-    free = {j: matrix.copy() for j, matrix in leaving.free.items()}
-    margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
-    part, other = (solid.name for solid in pair)
-    own = interference(pair, tolerances.overlap_of(part, other))
-    one_way = [
-        np.array(thread.axis)
-        for thread in threads
-        if (thread.bolt, thread.nut) == (part, other) and not thread.both_ways
-    ]
-    kept = {j for j in DIRECTIONS for axis in one_way if unit_vector(j) @ axis < -SAME_WAY}
-    i, k = names.index(part), names.index(other)
-    decided = {(part, j) for j in DIRECTIONS if j not in kept}
-    decided |= {(other, opposite(j)) for _, j in decided}
-    for j in DIRECTIONS:
-        for values, new in ((free[j], own.free[j]), (margin[j], own.margin[j])):
-            if (part, j) in decided:
-                values[i, k] = new[0, 1]
-            if (other, j) in decided:
-                values[k, i] = new[1, 0]
-
-    def is_decided(blocker: Blocker) -> bool:
-        both = {blocker.moving, blocker.staying} == {part, other}
-        return both and (blocker.moving, blocker.direction) in decided
-
-    rest = [blocker for blocker in leaving.blockers if not is_decided(blocker)]
-    return Interference(free, (*rest, *filter(is_decided, own.blockers)), margin)
 
 
 def _undercuts(
