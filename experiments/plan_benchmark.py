@@ -34,6 +34,7 @@ from cell.products.product import Part, Product
 from experiments.plan.gear_line import gear_line
 from experiments.plan.page import write_page
 from planning.assembly_plan.planner import plan
+from planning.assembly_plan.verdict import verdict_of
 from planning.feasibility.cache import cached_matrices
 from planning.feasibility.contact import gap_matrix
 from planning.feasibility.matrices import matrices_of
@@ -171,7 +172,8 @@ def timed_rule(product: Product) -> tuple[float, float, float]:
     choices = general_rule(product, fixing.order, fixing.steps, fixing.matrices, setup)
     marks.append(time.process_time())
     with tempfile.TemporaryDirectory() as folder:
-        write_page(Path(folder) / "plan.html", product, fixing, choices, setup)
+        verdict = verdict_of(fixing, choices)
+        write_page(Path(folder) / "plan.html", product, fixing, choices, verdict, setup)
     orders, chosen, page = np.diff([*marks, time.process_time()])
     return orders, chosen, page
 

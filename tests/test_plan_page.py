@@ -38,7 +38,7 @@ from planning.fixture_analysis.candidate import FixtureSetup
 from planning.fixture_analysis.rule import general_rule
 
 BAG = BagParameters()
-ONE = np.float32([0x3B, 0x6E, 0xA5]) / np.float32(255)
+ONE = np.array([0x3B, 0x6E, 0xA5], np.float32) / np.float32(255)
 SETUP = FixtureSetup.of(CellConfig())
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
 
