@@ -188,12 +188,12 @@ def test_accepting_all_overlaps_leaves_threads_threads():
     ]
 
 
-def test_what_is_declared_without_need_is_said():
+def test_what_is_declared_without_effect_is_said():
     product = two_blocks(0.0)
     declared = declared_from(product, press=["low,high"], snap=["high,low"], flexible=["low"])
     fixing = plan(replace(product, declared=declared))
     assert fixing.evidence
-    idle = [remark for remark in fixing.evidence.remarks if "without need" in remark]
+    idle = [remark for remark in fixing.evidence.remarks if "without effect" in remark]
     assert [remark.split(": ")[1].split(",")[0] for remark in idle] == [
         "press high",
         "snap high",

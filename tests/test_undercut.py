@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 from manifold3d import CrossSection, Manifold
+from pydrake.math import RigidTransform
 from tiny_products import box, product_of, rod
 
 from cell.products.declared import declared_from
@@ -26,14 +27,14 @@ def clipped(undercut: float, **declared: list[str]) -> Product:
     return replace(product, declared=declared_from(product, **declared))
 
 
-def belt_drive(flange: float, **declared: list[str]) -> Product:
+def belt_drive(low: float, high: float, **declared: list[str]) -> Product:
     """A belt round two pulleys on a base; flanges are wider than the belt's inside [mm]."""
     shapes = {"base": box((110, 40, 4), (-55, -20, 0))}
     outline = CrossSection.batch_hull(
         [CrossSection.circle(10, 96).translate([x, 0]) for x in (-30, 30)]
     )
     for name, x in (("pulley_a", -30), ("pulley_b", 30)):
-        pulley = rod(20, 4, 20, 96) + rod(20 + 2 * flange, 4, 6) + rod(20 + 2 * flange, 16, 20)
+        pulley = rod(20, 4, 20, 96) + rod(20 + 2 * low, 4, 6) + rod(20 + 2 * high, 16, 20)
         shapes[name] = pulley.translate([x, 0, 0])
     wide = outline.offset(2.0, circular_segments=96)
     shapes["belt"] = Manifold.extrude(wide - outline, 8).translate([0, 0, 7])
@@ -66,12 +67,41 @@ def test_a_snap_fit_does_not_excuse_other_parts():
     assert not fixing.feasible
 
 
-@pytest.mark.parametrize("flange", [1.0, 3.0])
-def test_a_belt_stretches_over_its_flanges_when_it_is_declared(flange):
-    assert not plan(belt_drive(flange)).feasible
-    fixing = plan(belt_drive(flange, flexible=["belt"]))
+@pytest.mark.parametrize(
+    ("low", "high", "ways"),
+    [(1.0, 1.0, {"+z"}), (3.0, 3.0, {"+z"}), (3.0, 1.0, {"+z"}), (1.0, 3.0, {"+z"})],
+)
+def test_a_belt_stretches_over_its_flanges_when_it_is_declared(low, high, ways):
+    """By the height of the flange, however thin it is; never through the base below."""
+    assert not plan(belt_drive(low, high)).feasible
+    fixing = plan(belt_drive(low, high, flexible=["belt"]))
     assert fixing.feasible and fixing.evidence
-    assert {one.direction for one in fixing.evidence.undercuts} <= {"+z", "-z"}
-    assert [1e3 * one.width for one in fixing.evidence.undercuts] == pytest.approx(
-        [min(flange, 2.0)] * len(fixing.evidence.undercuts), abs=0.05
-    )
+    assert {one.direction for one in fixing.evidence.undercuts} == ways
+    assert [1e3 * one.width for one in fixing.evidence.undercuts] == pytest.approx([high], abs=0.05)
+    belt, base = fixing.parts.index("belt"), fixing.parts.index("base")
+    assert fixing.free["-z"][belt, base] == 0
+
+
+@pytest.mark.parametrize(
+    "shape", [box((20, 20, 1), (-10, -10, -0.5)), Manifold.sphere(8, 32)], ids=["sheet", "ball"]
+)
+@pytest.mark.parametrize("kind", ["snap", "flexible"])
+def test_nothing_bends_out_of_a_closed_cavity(shape, kind):
+    shell = box((30, 30, 30), (-15, -15, -15)) - shape
+    product = product_of({"shell": shell, "part": shape})
+    declared = {"snap": ["part,shell"]} if kind == "snap" else {"flexible": ["part"]}
+    assert not plan(replace(product, declared=declared_from(product, **declared))).feasible
+
+
+def test_a_snap_that_sits_too_deep_is_measured_on_what_is_accepted():
+    """The clip is drawn 0.3 mm into the frame that it lies on."""
+    product = clipped(0.8)
+    clip = product.parts["clip"]
+    lower = replace(clip, X_AP=RigidTransform([0, 0, -3e-4]))
+    product = replace(product, parts={**product.parts, "clip": lower})
+    declared = declared_from(product, snap=["clip,frame"], accept=["clip,frame"])
+    fixing = plan(replace(product, declared=declared))
+    assert fixing.feasible and fixing.evidence
+    (one,) = fixing.evidence.undercuts
+    assert (one.part, one.direction) == ("frame", "-z")
+    assert 1e3 * one.width == pytest.approx(0.8, abs=0.01)

@@ -102,6 +102,8 @@ def _sorted_files(folder: Path, leave_out: Sequence[str]) -> tuple[list[Path], l
     for path in sorted(folder.iterdir()):
         wanted = next((name for name in leave_out if name in (path.name, path.stem)), None)
         if path.name.startswith("."):
+            if path.suffix.lower() in CAD_SUFFIXES:
+                left_out.append(LeftOut(path.name, "a hidden file"))
             continue
         if wanted is not None:
             left_out.append(LeftOut(wanted, NOT_WANTED))

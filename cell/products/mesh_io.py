@@ -76,10 +76,12 @@ def load_surfaces(path: Path, name: str) -> list[tuple[str, trimesh.Trimesh]]:
         BadPart: It cannot be read.
     """
     by = _objects(path) if path.suffix.lower() == ".obj" else {}
+    if path.suffix.lower() == ".stl":
+        _check_length(path, name)
     try:
         scene = trimesh.load_scene(path, process=False, **by)
     except Exception as error:  # The readers of the formats share no exception type.
-        raise BadPart(name, f"'{path.name}' cannot be read ({error})") from error
+        raise BadPart(name, f"'{path.name}' cannot be read ({_why(error)})") from error
     shapes = {str(n): g for n, g in scene.geometry.items() if isinstance(g, trimesh.Trimesh)}
     if not shapes:
         return [("", trimesh.Trimesh())]
@@ -87,6 +89,27 @@ def load_surfaces(path: Path, name: str) -> list[tuple[str, trimesh.Trimesh]]:
         return [("", merged(shape)) for shape in shapes.values()]
     listed = reversed(shapes.items()) if by else shapes.items()  # The reader goes backwards.
     return [(label, merged(shape)) for label, shape in listed]
+
+
+def _check_length(path: Path, name: str) -> None:
+    """Raise `BadPart` for a binary STL that ends before its last triangle."""
+    size = path.stat().st_size
+    with path.open("rb") as file:
+        head = file.read(84)
+    if len(head) < 84 or head[:5].lower() == b"solid":  # Empty, or text.
+        return
+    stated, held = int.from_bytes(head[80:84], "little"), (size - 84) // 50
+    if held < stated:
+        raise BadPart(name, f"'{path.name}' is cut off: {held} of {stated} triangles")
+
+
+def _why(error: Exception) -> str:
+    """Return the reason of a reader's error, as far as it states one."""
+    if isinstance(error, KeyError):
+        return f"it lacks {error}"
+    if isinstance(error, IndexError):
+        return f"a face refers to a vertex that is not there: {error}"
+    return str(error) or type(error).__name__
 
 
 def _objects(path: Path) -> dict[str, Any]:
@@ -111,7 +134,7 @@ def _read(path: Path, name: str) -> trimesh.Trimesh:
     try:
         mesh = trimesh.load_mesh(path, process=False)
     except Exception as error:  # The readers of the formats share no exception type.
-        raise BadPart(name, f"'{path.name}' cannot be read ({error})") from error
+        raise BadPart(name, f"'{path.name}' cannot be read ({_why(error)})") from error
     mesh = mesh.to_mesh() if isinstance(mesh, trimesh.Scene) else mesh
     if not isinstance(mesh, trimesh.Trimesh):
         raise BadPart(name, f"'{path.name}' holds no surface")

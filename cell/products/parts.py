@@ -54,6 +54,9 @@ def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Seque
             parts.left_out.append(LeftOut(name, node.lacking or "empty"))
             continue
         X_AP = node.surfaces[0].X_AP
+        if _scale(X_AP) < FLAT:
+            parts.left_out.append(LeftOut(name, "its pose squeezes it flat"))
+            continue
         key = (*(id(surface.mesh) for surface in node.surfaces), f"{_scale(X_AP):.6g}")
         if key not in known:
             known[key] = _Shape(node.surfaces)
@@ -80,6 +83,9 @@ def parts_of(named: Iterable[tuple[str, Node]], *, split: bool, leave_out: Seque
 def _among(name: str, names: Iterable[str]) -> str:
     """Return which of several names is this one, or that of a sub-assembly around it, or ""."""
     return next((n for n in names if name == n or name.startswith(f"{n}/")), "")
+
+
+FLAT = 1e-9  # Scale of a pose below which nothing is left of a shape.
 
 
 def _scale(X: np.ndarray) -> float:

@@ -128,19 +128,28 @@ def _item_freedoms(
 
 
 def _idle(product: Product, matrices: AssemblyMatrices) -> Iterator[str]:
-    """Yield remarks on what was declared without need."""
+    """Yield remarks on what was declared without effect."""
     overlapping = {frozenset((one.part, one.other)) for one in matrices.overlaps.others}
     bent = {frozenset((one.part, one.other)) for one in matrices.undercuts}
     declared = product.declared
     for kind, pairs, known, why in (
         ("accept", declared.accept, overlapping, "they do not overlap"),
         ("press", declared.press, overlapping, "they do not overlap"),
-        ("snap", declared.snap, bent, "one leaves the other without bending"),
+        (
+            "snap",
+            declared.snap,
+            bent,
+            "one leaves the other without bending, or would have to bend by more than a tenth of "
+            "its size along each axis",
+        ),
     ):
         for pair in sorted(sorted(pair) for pair in pairs - known):
-            yield f"declared without need: {kind} {','.join(pair)}, since {why}"
+            yield f"declared without effect: {kind} {','.join(pair)}, since {why}"
     for part in sorted(declared.flexible - {one.part for one in matrices.undercuts}):
-        yield f"declared without need: flexible {part}, since it leaves without bending"
+        yield (
+            f"declared without effect: flexible {part}, since it leaves without bending, or would "
+            "have to stretch by more than a tenth of its size along each axis"
+        )
 
 
 def _doubts(items: Sequence[str], matrices: AssemblyMatrices) -> list[str]:

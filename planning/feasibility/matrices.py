@@ -22,7 +22,7 @@ from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.coarse import COARSE
 from planning.feasibility.contact import contact_matrix, gap_matrix
 from planning.feasibility.directions import DIRECTIONS, opposite
-from planning.feasibility.fitting import refitted
+from planning.feasibility.fitting import fitted_solids, refitted
 from planning.feasibility.helical_threads import helical_threads
 from planning.feasibility.interference import Blocker, Interference, interference
 from planning.feasibility.overlaps import Overlap, Overlaps, find_overlaps
@@ -131,7 +131,8 @@ def matrices_of(
     if declared is None:
         tolerances, gaps = connecting(tolerances, parts, gaps)
     leaving = refitted(leaving, solids, overlaps, tolerances)
-    undercuts = tuple(_undercuts(product, solids, leaving, tolerances.overlap))
+    fitted, _ = fitted_solids(solids, overlaps, tolerances)
+    undercuts = tuple(_undercuts(product, fitted, leaving, tolerances.overlap))
     for one in undercuts:
         i, k = names.index(one.part), names.index(one.other)
         others = [k] if one.kind == "snap" else [n for n in range(len(names)) if n != i]
@@ -176,7 +177,9 @@ def _undercuts(
     for part, other in (sorted(pair, key=names.index) for pair in product.declared.snap):
         i, k = names.index(part), names.index(other)
         if not any(leaving.free[j][i, k] for j in DIRECTIONS):
-            yield snap_direction(solids[part], solids[other], tolerance)
+            found = snap_direction(solids[part], solids[other], tolerance)
+            if found is not None:
+                yield found
     for part in (name for name in names if name in product.declared.flexible):
         i = names.index(part)
         others = [k for k in range(len(names)) if k != i]
