@@ -207,8 +207,8 @@ def test_what_is_declared_without_effect_is_said():
         ({"press": ["block"]}, "write two different parts"),
         ({"press": ["block,block"]}, "write two different parts"),
         ({"accept": ["block,pin,pin"]}, "write two different parts"),
-        ({"snap": ["block,pni"]}, "No part 'pni'. Did you mean 'pin'"),
-        ({"flexible": ["belt"]}, "No part 'belt'"),
+        ({"snap": ["block,pni"]}, "No part or group 'pni'. Did you mean 'pin'"),
+        ({"flexible": ["belt"]}, "No part or group 'belt'"),
     ],
 )
 def test_wrong_declarations_name_the_culprit(declared, message):

@@ -12,7 +12,6 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 
 from cell.errors import InputError
-from cell.products.fields import one_of
 from cell.products.joints import PartNames
 
 Pair = frozenset[str]
@@ -73,7 +72,7 @@ def declared_from(
         accept=frozenset(_pairs(product, "accept", (p for p in accept if p != EVERY_OVERLAP))),
         press=frozenset(_pairs(product, "press", press)),
         snap=frozenset(_pairs(product, "snap", snap)),
-        flexible=frozenset(part for name in flexible for part in _members(product, name)),
+        flexible=frozenset(part for name in flexible for part in product.members(name)),
         accept_all=EVERY_OVERLAP in accept,
     )
 
@@ -83,15 +82,5 @@ def _pairs(product: PartNames, option: str, texts: Iterable[str]) -> Iterator[Pa
         names = [name.strip() for name in text.split(",")]
         if len(names) != 2 or names[0] == names[1]:
             raise InputError(f"'{option} {text}': write two different parts, like a,b.")
-        first, second = (_members(product, name) for name in names)
+        first, second = (product.members(name) for name in names)
         yield from (frozenset((a, b)) for a in first for b in second if a != b)
-
-
-def _members(product: PartNames, name: str) -> tuple[str, ...]:
-    if name in product.parts:
-        return (name,)
-    try:
-        return product.members(name)
-    except InputError:
-        one_of("part", name, product.parts)  # Lists the parts only: the usual case has no groups.
-        raise

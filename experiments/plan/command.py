@@ -13,6 +13,7 @@ from rich.console import Console
 from cell.configuration.config import CellConfig
 from cell.products.declared import declared_from
 from cell.products.loading import load_product
+from cell.products.product import Product
 from experiments.plan.options import PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
@@ -61,17 +62,7 @@ def run_plan(
     Raises:
         InputError: The product or the order cannot be used; nothing is written.
     """
-    described = load_product(product, options.read)
-    if options.up:
-        described = replace(described, up=options.up)
-    declared = declared_from(
-        described,
-        accept=options.accept,
-        press=options.press,
-        snap=options.snap,
-        flexible=options.flexible,
-    )
-    described = replace(described, declared=declared)
+    described = described_product(product, options)
     config = config or CellConfig()
     console = Console(highlight=False)
     with console.status("Matrices, steps and orders ...") as status:
@@ -118,6 +109,24 @@ def run_plan(
     timing = f"Planned in {fixing.seconds:.2f} s; {further}; at most {most:.0f} MB of memory."
     _print_lines(console, [timing, f"Verdict: {verdict.text}."])
     return 0 if fixing.feasible else 1
+
+
+def described_product(product: str, options: PlanOptions) -> Product:
+    """Return a product as it is read, with what the options say about it.
+
+    Args:
+        product: A name in ``models/products``, or anything else that ``load_product`` reads.
+        options: How it is read, which way is up, what is declared.
+    """
+    described = load_product(product, options.read)
+    declared = declared_from(
+        described,
+        accept=options.accept,
+        press=options.press,
+        snap=options.snap,
+        flexible=options.flexible,
+    )
+    return replace(described, declared=declared, up=options.up or described.up)
 
 
 def save_matrices(fixing: FixingPlan, file: Path) -> None:

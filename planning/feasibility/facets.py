@@ -45,7 +45,5 @@ def sagitta(solid: Solid, low: np.ndarray, high: np.ndarray) -> float:
     width = (2.0 * mesh.area_faces[pairs] / length[:, None]).min(axis=1)
     found = np.sort(width / 2.0 * np.tan(angle / 4.0))[::-1]
     # The largest sagitta that enough edges have, at least nearly.
-    for largest in found:
-        if np.count_nonzero((found <= largest) & (found >= ALIKE * largest)) >= FEWEST:
-            return float(largest)
-    return 0.0
+    shared = found[FEWEST - 1 :] >= ALIKE * found[: len(found) - FEWEST + 1]
+    return float(found[int(np.argmax(shared))]) if shared.any() else 0.0

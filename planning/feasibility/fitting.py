@@ -52,7 +52,11 @@ def fitted_solids(
 
 
 def refitted(
-    leaving: Interference, solids: Mapping[str, Solid], overlaps: Overlaps, tolerances: Tolerances
+    leaving: Interference,
+    fitted: Mapping[str, Solid],
+    pairs: Sequence[tuple[str, str]],
+    threads: Sequence[CadThread],
+    tolerances: Tolerances,
 ) -> Interference:
     """Decide the entries of parts anew that have been fitted to each other.
 
@@ -60,23 +64,24 @@ def refitted(
 
     Args:
         leaving: M_j of the parts as they are drawn.
-        solids: The n parts, by name in matrix order.
-        overlaps: Of the product.
+        fitted: The n parts, by name in matrix order, as ``fitted_solids`` returns them.
+        pairs: Those that have been fitted to each other.
+        threads: That were recognised.
         tolerances: Of the product.
     """
-    fitted, pairs = fitted_solids(solids, overlaps, tolerances)
     if not pairs:
         return leaving
-    own = [name for name in solids if any(name in pair for pair in pairs)]
+    involved = {name for pair in pairs for name in pair}
+    own = [name for name in fitted if name in involved]
     place = {name: number for number, name in enumerate(own)}
     wanted = np.zeros((len(own), len(own)), bool)
     for part, other in pairs:
         wanted[place[part], place[other]] = wanted[place[other], place[part]] = True
     anew = interference([fitted[name] for name in own], tolerances.overlaps(own), wanted=wanted)
-    decided = _decided(pairs, overlaps.threads)
+    decided = _decided(pairs, threads)
     free = {j: matrix.copy() for j, matrix in leaving.free.items()}
     margin = {j: matrix.copy() for j, matrix in leaving.margin.items()}
-    numbers = {name: number for number, name in enumerate(solids)}
+    numbers = {name: number for number, name in enumerate(fitted)}
     for moving, staying, j in decided:
         at, was = (numbers[moving], numbers[staying]), (place[moving], place[staying])
         free[j][at], margin[j][at] = anew.free[j][was], anew.margin[j][was]

@@ -36,7 +36,7 @@ from planning.feasibility.tolerance import (
 )
 from planning.feasibility.undercut import Undercut, snap_direction, stretch_directions
 
-MEETING = 2.0 * COARSE  # Of the tolerance.
+MEETING = 2.0 * COARSE  # [D] Of the tolerance: both surfaces may have been simplified.
 
 Progress = Callable[[int, int], None]
 """Is told how many comparisons of two parts have been made, of how many."""
@@ -130,8 +130,8 @@ def matrices_of(
         gaps[bolt, nut] = gaps[nut, bolt] = 0.0  # Flanks bear, whatever clearance is drawn.
     if declared is None:
         tolerances, gaps = connecting(tolerances, parts, gaps)
-    leaving = refitted(leaving, solids, overlaps, tolerances)
-    fitted, _ = fitted_solids(solids, overlaps, tolerances)
+    fitted, pairs = fitted_solids(solids, overlaps, tolerances)
+    leaving = refitted(leaving, fitted, pairs, overlaps.threads, tolerances)
     undercuts = tuple(_undercuts(product, fitted, leaving, tolerances.overlap))
     for one in undercuts:
         i, k = names.index(one.part), names.index(one.other)

@@ -4,9 +4,9 @@ Rigid parts cannot overlap, but CAD draws some that do. A thread often comes as 
 drill's diameter with a bolt at the nominal one: a product declares it, or it is recognised in the
 meshes (``cad_threads``). A press fit, or an overlap to be ignored, is declared by the user. In
 these cases, and where two curved surfaces overlap by no more than their facets are coarse, the
-common volume is cut out of one of the two, so that they touch line to line, before
-it is decided how they come apart. Any other overlap deeper than the tolerance is an error of poses
-or shapes; all of them are reported, and a plan with one of them is not feasible.
+common volume is cut out of one of the two (``fitting``), so that they touch line to line, before it
+is decided how they come apart. Any other overlap deeper than the tolerance is an error of poses or
+shapes; all of them are reported, and a plan with one of them is not feasible.
 """
 
 from __future__ import annotations
@@ -99,7 +99,7 @@ def find_overlaps(
         if thread:
             threads.append(thread)
             continue
-        found = overlap_of(solids[a], solids[b])
+        found = overlap_of(*pair)
         if found.depth <= tolerance:
             continue
         screw = _declared_screw(product, a, b, found.depth, tolerance)
@@ -107,7 +107,7 @@ def find_overlaps(
             screws.append(screw)
             continue
         kind = declared or ("accept" if product.declared.accept_all else "")
-        if not declared and found.depth <= _coarseness(solids[a], solids[b], found.depth):
+        if not declared and found.depth <= _coarseness(*pair, found.depth):
             kind = "facets"
         press_fit = find_press_fit(*pair, tolerance) is not None
         others.append(Overlap(a, b, found.depth, found.p_AoD, found.volume, kind, press_fit))
