@@ -97,8 +97,7 @@ def _least_excess(below: np.ndarray, above: np.ndarray, height: float) -> np.nda
 
 def heights_over(faces: Faces, points: np.ndarray) -> list[np.ndarray]:
     """Return the heights at which faces cross the vertical line over each point (q, 2)."""
-    low, high = faces.low[:, :2], faces.high[:, :2]
-    point, face = box_pairs(points - ON_EDGE, points + ON_EDGE, low, high)
+    point, face = _points_in_boxes(points, faces.low[:, :2] - ON_EDGE, faces.high[:, :2] + ON_EDGE)
     at = points[point]
     x, y = (faces.corners[face, :, k] - at[:, k, None] for k in (0, 1))
     turns = x * y[:, [1, 2, 0]] - x[:, [1, 2, 0]] * y
@@ -107,6 +106,25 @@ def heights_over(faces: Faces, points: np.ndarray) -> list[np.ndarray]:
     heights = planes[:, 0] * at[inside, 0] + planes[:, 1] * at[inside, 1] + planes[:, 2]
     order = np.argsort(point, kind="stable")
     return np.split(heights[order], np.searchsorted(point[order], np.arange(1, len(points))))
+
+
+def _points_in_boxes(
+    points: np.ndarray, low: np.ndarray, high: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return the indices of points (q, 2) and of rectangles that they lie in.
+
+    Points are few and rectangles many: those between whose ends along the first axis no point lies
+    are dropped at once.
+    """
+    order = np.argsort(points[:, 0], kind="stable")
+    sorted_points = points[order]
+    first = np.searchsorted(sorted_points[:, 0], low[:, 0], "left")
+    count = np.searchsorted(sorted_points[:, 0], high[:, 0], "right") - first
+    box = np.repeat(np.arange(len(low)), count)
+    at = np.repeat(first, count) + _ranges(count)
+    across = sorted_points[at, 1]
+    inside = np.flatnonzero((across >= low[box, 1]) & (across <= high[box, 1]))
+    return order[at[inside]], box[inside]
 
 
 def paired(down: Faces, up: Faces, d: np.ndarray, u: np.ndarray) -> FacePairs:
@@ -144,8 +162,11 @@ def faces_about(down: Faces, up: Faces, point: np.ndarray, reach: float) -> Face
 
 
 def _outermost(faces: Faces, point: np.ndarray, reach: float) -> np.ndarray:
-    every, box = np.arange(len(faces.low)), ((point - reach)[None], (point + reach)[None])
-    near = np.flatnonzero(touching(faces, every, *box))
+    low, high = point - reach, point + reach
+    near = (faces.low[:, 0] <= high[0]) & (faces.high[:, 0] >= low[0])
+    near &= (faces.low[:, 1] <= high[1]) & (faces.high[:, 1] >= low[1])
+    near = np.flatnonzero(near)
+    near = near[touching(faces, near, low[None], high[None])]
     heights = faces.planes[near, :2] @ point + faces.planes[near, 2]
     heights = np.clip(heights, faces.low[near, 2], faces.high[near, 2])
     return near[np.argsort(-faces.facing * heights, kind="stable")[:OUTERMOST]]

@@ -35,10 +35,11 @@ def fitted_solids(
     Returns:
         The parts, and the pairs that have been fitted to each other; of a thread, (bolt, nut).
     """
-    fitted, pairs = dict(solids), []
-    for thread in overlaps.threads:
-        fitted[thread.nut] = unthreaded(fitted[thread.nut], solids[thread.bolt], thread)
-        pairs.append((thread.bolt, thread.nut))
+    fitted = dict(solids)
+    pairs = [(thread.bolt, thread.nut) for thread in overlaps.threads]
+    for name in dict.fromkeys(nut for _, nut in pairs):
+        bolts = [(solids[one.bolt], one) for one in overlaps.threads if one.nut == name]
+        fitted[name] = unthreaded(solids[name], bolts)
     for bolt, nut in overlaps.screws:
         fitted[nut] = fitted[nut].without(solids[bolt])
         pairs.append((bolt, nut))

@@ -12,7 +12,7 @@ a third part that holds its head, is not seen.
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import manifold3d
@@ -118,40 +118,49 @@ def helical_threads(
     return tuple(thread for thread in found if thread is not None)
 
 
-def unthreaded(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
-    """Return what of a nut still blocks a bolt that leaves by turning.
+def unthreaded(nut: Solid, bolts: Sequence[tuple[Solid, CadThread]]) -> Solid:
+    """Return what of a nut still blocks the bolts that leave it by turning.
 
     Args:
-        nut: Part with the inner thread.
-        bolt: Part with the outer one.
-        thread: As found between them.
+        nut: Part with the inner threads.
+        bolts: Parts with the outer ones, each with the thread found between it and the nut.
 
     Returns:
-        The nut without the turns of its thread, from the engaged ones on in the direction in which
-        the bolt turns out, or all of them if it turns out both ways. What lies further in or
-        further out than the thread stays, and so do steps and caps on the other side. Of a thread
-        drawn as overlapping cylinders, the overlap is cut, and the rest of its bore is widened as
-        if it were tapped from end to end: a set screw lies deep in its hole.
+        The nut without the turns of its threads, from the engaged ones on in the direction in which
+        a bolt turns out, or all of them if it turns out both ways. What lies further in or further
+        out than a thread stays, and so do steps and caps on the other side. Of a thread drawn as
+        overlapping cylinders, the overlap is cut, and the rest of its bore is widened as if it were
+        tapped from end to end: a set screw lies deep in its hole.
     """
-    far = float(
-        np.linalg.norm(np.maximum(nut.upper, bolt.upper) - np.minimum(nut.lower, bolt.lower))
-    )
-    if thread.pitch is None:
-        return _tapped(nut.without(bolt), bolt, thread, far)
+    turns = [_turns(nut, bolt, thread) for bolt, thread in bolts if thread.pitch is not None]
+    if turns:
+        nut = nut.shaped(nut.manifold - manifold3d.Manifold.batch_boolean(turns, OpType.Add))
+    for bolt, thread in bolts:
+        if thread.pitch is None:
+            nut = _tapped(nut.without(bolt), bolt, thread)
+    return nut
+
+
+def _turns(nut: Solid, bolt: Solid, thread: CadThread) -> manifold3d.Manifold:
+    """Return the space that the turns of a helical thread take, as far as the bolt turns out."""
     axis, middle = np.array(thread.axis), np.array(thread.p_AoT)
+    far = _reach(nut, bolt)
     start = -far if thread.both_ways else -thread.length / 2.0
     # Half a height wider than the teeth, so that no slivers of them are left.
     outer = (thread.diameter + thread.height) / 2.0 / np.cos(np.pi / ROUND)
     inner = max((thread.diameter - 3.0 * thread.height) / 2.0, thread.diameter / 8.0)
     tube, bore = (manifold3d.Manifold.cylinder(far - start, r, r, ROUND) for r in (outer, inner))
-    zone = (tube - bore).translate([0.0, 0.0, start]).transform(np.c_[_frame(axis), middle])
-    mesh = (nut.manifold - zone).to_mesh64()
-    vertices = np.array(mesh.vert_properties)[:, :3]
-    return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
+    return (tube - bore).translate([0.0, 0.0, start]).transform(np.c_[_frame(axis), middle])
 
 
-def _tapped(nut: Solid, bolt: Solid, thread: CadThread, far: float) -> Solid:
-    """Return a nut whose bore has the thread's outer diameter as far as it is open, at most far.
+def _reach(nut: Solid, bolt: Solid) -> float:
+    """Return a length beyond both parts [m]."""
+    low, high = np.minimum(nut.lower, bolt.lower), np.maximum(nut.upper, bolt.upper)
+    return float(np.linalg.norm(high - low))
+
+
+def _tapped(nut: Solid, bolt: Solid, thread: CadThread) -> Solid:
+    """Return a nut whose bore has the thread's outer diameter as far as it is open.
 
     That matters on the sides on which the bolt ends in the bore, unless its head keeps it from
     leaving there.
@@ -169,7 +178,7 @@ def _tapped(nut: Solid, bolt: Solid, thread: CadThread, far: float) -> Solid:
     if not ends_inside:
         return nut
     outer = thread.diameter / 2.0 / np.cos(np.pi / ROUND)
-    inner = OPEN * (thread.diameter / 2.0 - thread.height)
+    inner, far = OPEN * (thread.diameter / 2.0 - thread.height), _reach(nut, bolt)
     shape = nut.manifold
     for sign in ends_inside:
         frame = np.c_[_frame(sign * axis), middle]
@@ -179,9 +188,7 @@ def _tapped(nut: Solid, bolt: Solid, thread: CadThread, far: float) -> Solid:
         # A film of rounding at the end of the engaged thread does not close the bore.
         open_to = float(depth[depth > end].min(initial=far))
         shape -= manifold3d.Manifold.cylinder(open_to, outer, outer, ROUND).transform(frame)
-    mesh = shape.to_mesh64()
-    vertices = np.array(mesh.vert_properties)[:, :3]
-    return Solid(nut.name, vertices, np.array(mesh.tri_verts, int), nut.mass, nut.p_AoG)
+    return nut.shaped(shape)
 
 
 def _frame(axis: np.ndarray) -> np.ndarray:
@@ -195,9 +202,8 @@ def _sectioned(
 ) -> _Pair | None:
     """Return the sections of two parts, or None if they do not interlock as they turn in place."""
     # Of the nut, what the bolt can reach: sections of a large plate with many holes take long.
-    arm = bolt.vertices - centre
-    radius = float(np.linalg.norm(np.cross(arm, axis), axis=1).max()) + THREAD_CLEARANCE
-    far = float(np.linalg.norm(np.concatenate([arm, nut.vertices - centre]), axis=1).max())
+    radii = np.linalg.norm(np.cross(bolt.vertices - centre, axis), axis=1)
+    radius, far = float(radii.max()) + THREAD_CLEARANCE, _reach(nut, bolt)
     reached = manifold3d.Manifold.cube([2.0 * radius, 2.0 * radius, 2.0 * far], True)
     reached = reached.transform(np.c_[_frame(axis), centre])
     bolt_sections = axial_sections(bolt.manifold, axis, centre)

@@ -31,6 +31,10 @@ from planning.feasibility.overlap_depth import overlap_of
 from planning.feasibility.solids import Solid
 from planning.feasibility.tolerance import Tolerances
 
+# [M] Of two parts; above it their common volume, half a second for two long helices, takes longer
+# than to look for a helical thread in sections.
+MANY_FACES = 100_000
+
 
 @dataclass(frozen=True)
 class Overlap:
@@ -95,7 +99,10 @@ def find_overlaps(
         pair = solids[a], solids[b]
         thread = None
         if not declared:
-            thread = find_thread(*pair, tolerance) or find_helical_thread(*pair, tolerance)
+            finders = [find_thread, find_helical_thread]
+            if sum(len(solid.faces) for solid in pair) > MANY_FACES:
+                finders.reverse()  # No pair is a thread of both kinds: only the time differs.
+            thread = next(filter(None, (find(*pair, tolerance) for find in finders)), None)
         if thread:
             threads.append(thread)
             continue

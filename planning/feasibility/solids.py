@@ -94,7 +94,7 @@ class Solid:
 
     def without(self, other: Solid) -> Solid:
         """Return this part with the other's volume cut out; mass and p_AoG stay."""
-        return self._shaped(self.manifold - other.manifold)
+        return self.shaped(self.manifold - other.manifold)
 
     def simplified(self, deviation: float) -> Solid:
         """Return this part with fewer faces, which lie within a deviation [m] of its own."""
@@ -102,10 +102,11 @@ class Solid:
         if deviation not in known:
             # A manifold that is built for this alone is not kept: it is larger than the mesh.
             whole = self if "manifold" in vars(self) else replace(self)
-            known[deviation] = self._shaped(whole.manifold.simplify(deviation))
+            known[deviation] = self.shaped(whole.manifold.simplify(deviation))
         return known[deviation]
 
-    def _shaped(self, manifold: manifold3d.Manifold) -> Solid:
+    def shaped(self, manifold: manifold3d.Manifold) -> Solid:
+        """Return this part with another shape; mass and p_AoG stay."""
         mesh = manifold.to_mesh64()
         vertices, faces = np.array(mesh.vert_properties)[:, :3], np.array(mesh.tri_verts, int)
         shaped = Solid(self.name, vertices, faces, self.mass, self.p_AoG)
