@@ -45,6 +45,7 @@ GROUP = 50_000  # Pairs of faces held at once, of several pairs of parts.
 PROBES = 12  # Faces of a finely tessellated part over which is looked before all are compared.
 ABOUT = 2.0  # Tolerances about a probe within which a region must be wide enough.
 SEEDS, NEAR = 4, 2.0  # Widest slivers, each merged with the slivers within this many tolerances.
+WIDEST = 96  # Of those about the first, which suffice for most parts.
 
 
 @dataclass(frozen=True, eq=False)
@@ -218,12 +219,13 @@ def _decided(
     for parts, pairs in group.items():
         if parts in found:
             continue
-        if _blocked_point(pairs, less) is None:
+        ambiguous = _InBatches.of(pairs)
+        if ambiguous.blocked_point(less) is None:
             found[parts] = Decision(None, FRAGILE * tolerance)
-        elif (point := _blocked_point(pairs, more)) is not None:
+        elif (point := ambiguous.blocked_point(more)) is not None:
             found[parts] = Decision(point, FRAGILE * tolerance)
         else:
-            found[parts] = _bisected(pairs, tolerance, halvings)
+            found[parts] = _bisected(ambiguous, tolerance, halvings)
     return found
 
 
@@ -241,9 +243,9 @@ def _region_hits(
             hits[parts] = centres[0]
         else:
             seeds[parts] = centres
-    for number in range(SEEDS):
+    for number, most in ((0, WIDEST), *((number, None) for number in range(SEEDS))):
         around = {
-            parts: group[parts].near(centres[number], NEAR * tolerance)
+            parts: group[parts].near(centres[number], NEAR * tolerance).chosen(slice(most))
             for parts, centres in seeds.items()
             if parts not in hits and number < len(centres)
         }
@@ -282,14 +284,14 @@ def _clipped(
     }
 
 
-def _bisected(pairs: FacePairs, tolerance: float, halvings: int) -> Decision:
+def _bisected(ambiguous: _InBatches, tolerance: float, halvings: int) -> Decision:
     """Decide a pair of parts that is blocked at the lower tolerance and free at the higher."""
-    point = _blocked_point(pairs, tolerance)
+    point = ambiguous.blocked_point(tolerance)
     step = FRAGILE * tolerance * (1.0 if point is not None else -1.0)
     same, flipped = 0.0, 1.0  # [step] Where the decision is the same, and where it has flipped.
-    for _ in range(halvings if len(pairs) < BATCH else halvings // 2):
+    for _ in range(halvings if len(ambiguous.pairs) < BATCH else halvings // 2):
         middle = (same + flipped) / 2
-        changed = _blocked_point(pairs, tolerance + middle * step)
+        changed = ambiguous.blocked_point(tolerance + middle * step)
         if (changed is None) == (point is None):
             same = middle
         else:
@@ -297,19 +299,30 @@ def _bisected(pairs: FacePairs, tolerance: float, halvings: int) -> Decision:
     return Decision(point, same * abs(step))
 
 
-def _blocked_point(pairs: FacePairs, tolerance: float) -> np.ndarray | None:
-    """Return a point (2,) of the plane over which the faces block, or None."""
-    if len(pairs) > BATCH and (hits := _region_hits({(0, 1): pairs}, tolerance)):
-        return hits[0, 1]
-    slivers: list[_Regions] = []
-    for start in range(0, len(pairs), BATCH):
-        batch = pairs.chosen(slice(start, start + BATCH))
-        regions = _clipped({(0, 1): batch}, tolerance)[0, 1]
-        widest = int(regions.radii.argmax())
-        if regions.radii[widest] >= tolerance:
-            return regions.centres[widest]
-        slivers.append(regions)
-    return _wide_point(slivers, tolerance)
+@dataclass(frozen=True, eq=False)
+class _InBatches:
+    """All faces of two parts that can hit each other, to be decided at several tolerances."""
+
+    pairs: FacePairs
+    batches: Sequence[FacePairs]
+
+    @staticmethod
+    def of(pairs: FacePairs) -> _InBatches:
+        starts = range(0, len(pairs), BATCH)
+        return _InBatches(pairs, [pairs.chosen(slice(start, start + BATCH)) for start in starts])
+
+    def blocked_point(self, tolerance: float) -> np.ndarray | None:
+        """Return a point (2,) of the plane over which the faces block, or None."""
+        if len(self.batches) > 1 and (hits := _region_hits({(0, 1): self.pairs}, tolerance)):
+            return hits[0, 1]
+        slivers: list[_Regions] = []
+        for batch in self.batches:
+            regions = _clipped({(0, 1): batch}, tolerance)[0, 1]
+            widest = int(regions.radii.argmax())
+            if regions.radii[widest] >= tolerance:
+                return regions.centres[widest]
+            slivers.append(regions)
+        return _wide_point(slivers, tolerance)
 
 
 def _wide_point(slivers: Sequence[_Regions], tolerance: float) -> np.ndarray | None:

@@ -11,6 +11,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -45,6 +46,11 @@ class FacePairs:
     low: np.ndarray
     high: np.ndarray
 
+    @cached_property
+    def overlaps(self) -> Polygons:
+        """Where the two faces of each pair overlap, seen along the axis, possibly nowhere."""
+        return triangle_overlaps(self.down.corners[self.d], self.up.corners[self.u])
+
     def __len__(self) -> int:
         return len(self.d)
 
@@ -66,14 +72,17 @@ def blocked_regions(several: Sequence[FacePairs], height: float) -> Polygons:
     clipping few polygons takes as long as clipping many. Of two faces that lie on each other, the
     height counts across them (see ``_least_excess``).
     """
-    down = np.concatenate([pairs.down.corners[pairs.d] for pairs in several])
-    up = np.concatenate([pairs.up.corners[pairs.u] for pairs in several])
+    if len(several) == 1:
+        overlaps = several[0].overlaps  # Kept: ambiguous parts are decided at several heights.
+    else:
+        down = np.concatenate([pairs.down.corners[pairs.d] for pairs in several])
+        up = np.concatenate([pairs.up.corners[pairs.u] for pairs in several])
+        overlaps = triangle_overlaps(down, up)
     below = np.concatenate([pairs.down.planes[pairs.d] for pairs in several])
     above = np.concatenate([pairs.up.planes[pairs.u] for pairs in several])
     excess = above - below
-    regions = triangle_overlaps(down, up)
     slope, offset = excess[:, None, :2], excess[:, 2] - _least_excess(below, above, height)
-    return regions.clipped((regions.corners * slope).sum(axis=2) + offset[:, None])
+    return overlaps.clipped((overlaps.corners * slope).sum(axis=2) + offset[:, None])
 
 
 def _least_excess(below: np.ndarray, above: np.ndarray, height: float) -> np.ndarray:
