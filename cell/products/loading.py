@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Sized
 from dataclasses import replace
 from pathlib import Path
 
@@ -211,8 +211,13 @@ def _groups(parts: Iterable[str], depth: int | None) -> dict[str, tuple[str, ...
     }
     if depth is not None and not groups:
         deepest = max((name.count("/") + 1 for name in found), default=0)
-        raise InputError(f"--depth {depth}: the deepest sub-assembly is at level {deepest}.")
+        there = f"the deepest sub-assembly is at level {deepest}" if found else "there is none"
+        raise InputError(f"--depth {depth} asks for sub-assemblies: {there}.")
     return groups
+
+
+def _parts(members: Sized) -> str:
+    return "1 part" if len(members) == 1 else f"{len(members)} parts"
 
 
 def _tree(parts: Iterable[str], groups: Mapping[str, tuple[str, ...]]) -> list[str]:
@@ -221,11 +226,9 @@ def _tree(parts: Iterable[str], groups: Mapping[str, tuple[str, ...]]) -> list[s
     if not found:
         return []
     if groups:
-        listed = _listed([f"{name} ({len(members)} parts)" for name, members in groups.items()])
+        listed = _listed([f"{name} ({_parts(members)})" for name, members in groups.items()])
         return [f"sub-assemblies that are one item each: {listed}"]
-    listed = _listed(
-        [f"{n} ({len(members)} parts)" for n, members in found.items() if "/" not in n]
-    )
+    listed = _listed([f"{n} ({_parts(members)})" for n, members in found.items() if "/" not in n])
     return [f"sub-assemblies: {listed}; --depth 1 makes one item of each"]
 
 

@@ -36,8 +36,9 @@ def advice_text(advice: OrderAdvice) -> str:
     lines.append(f"Best orders ({claim}): {OBJECTIVE}.")
     for number, ranked in enumerate(advice.ranked, start=1):
         unstable = f", {ranked.unstable_stages} unstable stages" if ranked.unstable_stages else ""
+        refixings = "1 re-fixing" if ranked.refixings == 1 else f"{ranked.refixings} re-fixings"
         lines.append(
-            f"  {number}. {','.join(ranked.order)}: {ranked.refixings} re-fixings{unstable}, "
+            f"  {number}. {','.join(ranked.order)}: {refixings}{unstable}, "
             f"mean CoG height {1e3 * ranked.mean_cog_height:.1f} mm"
         )
     if advice.nearest:
