@@ -1,4 +1,4 @@
-"""Convergence of the holding force: `python -m experiments.jig_convergence [--out DIR]`.
+"""Convergence of the holding force: `python -m experiments.jig_convergence [--workers N]`.
 
 The holding force of a standing cylinder, a lying cylinder and the plate on its foot, over the mesh
 size of the frozen bed, the cell of the soft bed, the time step and the contact approximation, one
@@ -13,18 +13,23 @@ tends to that of "lagged" as the speed goes to zero: both are measured at two sp
 from __future__ import annotations
 
 import csv
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import tyro
 
-from cell import load_product
-from cell.fixtures.soft_jig import JigParameters
+from cell import CellConfig, load_product
+from cell.errors import RunFailure
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.campaigns.trial import Outcome, Row, Task
+from experiments.cli.common import exit_code
 from experiments.jig.element_rig import ElementRig
-from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS, parameters
+from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS
 from experiments.jig.specimens import Prism, ProductPart, Specimen
 
 DEPTH = 0.010
@@ -43,35 +48,29 @@ class Variation:
     Attributes:
         varied: Name of the varied quantity.
         value: Its value, as text.
-        params: Of the jig.
-        time_step: [s].
-        approximation: Discrete contact approximation of Drake.
+        changes: Of settings, by path.
         speed: Of the drag [m/s].
     """
 
     varied: str
     value: str
-    params: JigParameters
-    time_step: float = 1e-3
-    approximation: str = "lagged"
+    changes: Mapping[str, Any] = field(default_factory=dict)
     speed: float = SPEED
 
 
 def variations() -> Iterator[Variation]:
     """Yield the variations, coarse to fine; the default is part of every sequence."""
-    params = parameters()
     for size in MESH_SIZES:
-        jammed = replace(params.jammed, mesh_size=size)
-        yield Variation("mesh size", f"{size * 1e3:g} mm", replace(params, jammed=jammed))
+        yield Variation("mesh size", f"{size * 1e3:g} mm", {"jig.jammed.mesh_size": size})
     for cell in CELLS:
-        bag = replace(params.bag, cell=cell)
-        yield Variation("bed cell", f"{cell * 1e3:g} mm", replace(params, bag=bag))
+        yield Variation("bed cell", f"{cell * 1e3:g} mm", {"jig.bag.cell": cell})
     for step in STEPS:
-        yield Variation("time step", f"{step * 1e3:g} ms", params, time_step=step)
+        yield Variation("time step", f"{step * 1e3:g} ms", {"simulation.time_step": step})
     for name in APPROXIMATIONS:
-        yield Variation("approximation", name, params, approximation=name)
+        yield Variation("approximation", name, {"simulation.contact_approximation": name})
     for name in APPROXIMATIONS:
-        yield Variation("dragged slowly", name, params, approximation=name, speed=SLOW)
+        changes = {"simulation.contact_approximation": name}
+        yield Variation("dragged slowly", name, changes, speed=SLOW)
 
 
 def specimens() -> dict[str, Specimen]:
@@ -84,21 +83,31 @@ def specimens() -> dict[str, Specimen]:
     }
 
 
-def holding_force(specimen: Specimen, variation: Variation, depth: float = DEPTH) -> float:
-    """Return the resistance [N] to a push near the top of a part, across its least stable side."""
+def hold(
+    task: Task, *, specimen: str = "standing", speed: float = SPEED, depth: float = DEPTH
+) -> Outcome:
+    """Measure the resistance to a push near the top of a part, across its least stable side.
+
+    Args:
+        task: With the settings of a variation.
+        specimen: Name of the part.
+        speed: Of the drag [m/s].
+        depth: To which the part is pressed in [m].
+    """
+    part, steps = specimens()[specimen], task.config.simulation
     rig = ElementRig(
-        variation.params,
-        specimen,
-        time_step=variation.time_step,
-        approximation=variation.approximation,
+        task.config.jig,
+        part,
+        time_step=steps.time_step,
+        approximation=steps.contact_approximation,
     )
     rig.lower_to(depth, speed=0.04)
     rig.jam()
     rig.let_go(0.2)
-    top = rig.X_JP.inverse() @ np.array([0.0, 0.0, rig.params.bag.cap_height + lever(specimen)])
+    top = rig.X_JP.inverse() @ np.array([0.0, 0.0, rig.params.bag.cap_height + lever(part)])
     # A cylinder lying along x is pushed across its axis, the plate out of its plane.
-    direction = SIDEWAYS if isinstance(specimen, Prism) and not specimen.lying else across(rig)
-    return rig.drag(top, direction, speed=variation.speed).holding_force
+    direction = SIDEWAYS if isinstance(part, Prism) and not part.lying else across(rig)
+    return Outcome(True, {"holding_N": rig.drag(top, direction, speed=speed).holding_force})
 
 
 def lever(specimen: Specimen) -> float:
@@ -130,23 +139,58 @@ def last_refinement(rows: Sequence[Sequence[Any]]) -> dict[str, list[float]]:
     return changes
 
 
-def main(out: Path = Path("out/convergence")) -> None:
-    """Run the study, print the table and write it."""
+def main(out: Path = Path("out/convergence"), workers: int = 1) -> int:
+    """Run what is missing of the study, print the table and write it; return the exit code."""
+    return exit_code("jig_convergence", lambda: run(out, workers))
+
+
+def run(out: Path, workers: int) -> int:
+    """Run the study as a campaign; return 0.
+
+    Raises:
+        RunFailure: A trial came to no verdict.
+    """
     out.mkdir(parents=True, exist_ok=True)
-    parts = specimens()
-    rows: list[list[str | float]] = []
-    for variation in variations():
-        forces = [holding_force(part, variation) for part in parts.values()]
-        rows.append([variation.varied, variation.value, *forces])
-        values = "".join(f"{force:9.2f} N" for force in forces)
-        print(f"{variation.varied:14s} {variation.value:8s}{values}", flush=True)
+    names = list(specimens())
+    found = list(variations())
+    points = [
+        {"specimen": name, "speed": each.speed, **each.changes} for each in found for name in names
+    ]
+    wanted = [trials(hold, [point], config=vented()) for point in points]
+    planned = {trial.key: trial for (trial,) in wanted}
+    ended = {row.key: row for row in run_campaign(list(planned.values()), out, workers=workers)}
+    forces = [force_of(ended[trial.key]) for (trial,) in wanted]
+    rows: list[list[str | float]] = [
+        [each.varied, each.value, *forces[k * len(names) : (k + 1) * len(names)]]
+        for k, each in enumerate(found)
+    ]
+    for varied, value, *values in rows:
+        print(f"{varied:14s} {value:8s}" + "".join(f"{force:9.2f} N" for force in values))
     for varied, changes in last_refinement(rows).items():
         print(f"{varied:14s} {'last':8s}" + "".join(f"{change:+9.1%}  " for change in changes))
     with (out / "convergence.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["varied", "value", *(f"{name} [N]" for name in parts)])
+        writer.writerow(["varied", "value", *(f"{name} [N]" for name in names)])
         writer.writerows(rows)
+    return 0
+
+
+def vented() -> CellConfig:
+    """Return the default configuration without suction: elastic contact and yield alone."""
+    return CellConfig.load("default", {"jig.suction.enabled": False})
+
+
+def force_of(row: Row) -> float:
+    """Return the holding force that a trial measured [N].
+
+    Raises:
+        RunFailure: It came to no verdict.
+    """
+    force = row.measured.get("holding_N")
+    if force is None:
+        raise RunFailure(f"{row.varied}: {row.evidence or row.verdict}")
+    return force
 
 
 if __name__ == "__main__":
-    tyro.cli(main)
+    sys.exit(tyro.cli(main))

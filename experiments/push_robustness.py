@@ -16,10 +16,8 @@ differs.
 
 from __future__ import annotations
 
-import multiprocessing
 import sys
-from collections.abc import Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Annotated, Any
@@ -33,11 +31,13 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.configuration.config import CellConfig
 from cell.configuration.sections import entries
-from cell.products.loading import load_product
+from cell.errors import RunFailure
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.campaigns.trial import Row
 from experiments.cli.common import BadUsage, Common, exit_code
 from experiments.paper.case_plots import PAPER_MEANS
-from experiments.paper.cases import run_cases
-from experiments.paper.place_push import cases_of
+from experiments.paper.cases import cases_of
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import versions
 
@@ -95,8 +95,8 @@ class RobustnessOptions:
     controls: bool = False
     """Also push without suction, at 30 kPa, on the bed left soft, and on a flat rigid plate."""
 
-    workers: Annotated[int, arg(metavar="CORES")] = 1
-    """Variants at a time."""
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Trials at a time. What is done already is not run again."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
@@ -169,38 +169,47 @@ def config_of(options: RobustnessOptions, variant: Variant) -> CellConfig:
     return common.load_config()
 
 
-def run_variant(options: RobustnessOptions, variant: Variant) -> dict[str, Any]:
-    """Run one trial of every case with a variant; return its row of the result."""
-    done = run_cases(
-        cases_of("push", options.case),
-        product=load_product("motor_unit"),
-        config=config_of(options, variant),
-        trials=1,
-        seed=options.common.seed,
+def run_variants(
+    options: RobustnessOptions, wanted: Sequence[Variant], out: Path, console: Console
+) -> list[dict[str, Any]]:
+    """Run one trial of every case with every variant, as a campaign; return a row per variant."""
+    cases = [{"case": case.label} for case in cases_of("push", options.case)]
+    seeds = [options.common.seed]
+    by_variant = {
+        variant.name: trials("push", cases, config=config_of(options, variant), seeds=seeds)
+        for variant in wanted
+    }
+    planned = {trial.key: trial for own in by_variant.values() for trial in own}
+    rows = run_campaign(
+        list(planned.values()),
+        out,
+        workers=options.workers,
+        about={"command": "push_robustness"},
+        console=console,
+        report=False,
     )
-    outcomes = {result.case.label: result for result, _ in done}
+    ended = {row.key: row for row in rows}
+    return [
+        row_of(variant, [ended[trial.key] for trial in by_variant[variant.name]])
+        for variant in wanted
+    ]
+
+
+def row_of(variant: Variant, rows: Sequence[Row]) -> dict[str, Any]:
+    """Return the row of the result for a variant, from the trials of its cases.
+
+    Raises:
+        RunFailure: A trial came to no verdict.
+    """
+    for row in rows:
+        if not row.done:
+            raise RunFailure(f"{variant.name}, {row.options['case']}: {row.evidence}")
     return {
         "variant": variant.name,
         "changes": dict(variant.changes),
-        "outcome": {label: result.outcome for label, result in outcomes.items()},
-        "displacement_m": {
-            label: result.means().get("displacement_m") for label, result in outcomes.items()
-        },
+        "outcome": {row.options["case"]: row.verdict for row in rows},
+        "displacement_m": {row.options["case"]: row.measured.get("displacement_m") for row in rows},
     }
-
-
-def run_variants(
-    options: RobustnessOptions, wanted: Sequence[Variant], console: Console
-) -> Iterator[dict[str, Any]]:
-    """Run variants in parallel; print which cases each of them flips, and yield its row."""
-    base: dict[str, Any] | None = None
-    spawn = multiprocessing.get_context("spawn")
-    with ProcessPoolExecutor(options.workers, spawn) as pool:
-        for row in pool.map(run_variant, [options] * len(wanted), wanted):
-            base = row if base is None else base
-            flipped = ", ".join(flips(row, base)) or "none"
-            console.print(f"{row['variant']}: flips {flipped}", markup=False)
-            yield row
 
 
 def flips(row: Mapping[str, Any], base: Mapping[str, Any]) -> list[str]:
@@ -244,7 +253,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run(options: RobustnessOptions) -> int:
-    """Run all variants, write ``result.json`` after each and print the tables; return 0.
+    """Run what is missing of the variants, write ``result.json``, print the tables; return 0.
 
     Raises:
         InputError: An option or a value is invalid.
@@ -268,12 +277,13 @@ def run(options: RobustnessOptions) -> int:
     wanted = variants(options, config)
     for variant in wanted:
         config_of(options, variant)  # Invalid values are refused before hours of computation.
-    rows: list[dict[str, Any]] = []
-    result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
     with output_folder(Path(options.common.out)) as out:
-        for row in run_variants(options, wanted, console):
-            rows.append(row)
-            write_json(out / "result.json", result | {"versions": versions()})
+        rows = run_variants(options, wanted, out, console)
+        result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
+        write_json(out / "result.json", result | {"versions": versions()})
+    for row in rows[1:]:
+        flipped = ", ".join(flips(row, rows[0])) or "none"
+        console.print(f"{row['variant']}: flips {flipped}", markup=False)
     console.print(displacement_table(rows))
     if options.samples:
         console.print(robustness_table(rows))

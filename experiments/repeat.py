@@ -2,47 +2,56 @@
 
     python -m experiments.repeat --seeds 10 --workers 2 --out out/repeat
 
-Every run is one of `soft-jig assemble`, in its own process and folder. Prints one row per seed and
-one per limit, and writes both to summary.json.
+The same as `soft-jig sweep assemble --seeds 10`, with a table of what was measured beside its
+limits.
 """
 
 from __future__ import annotations
 
-import json
-import multiprocessing
 import sys
-from collections.abc import Sequence
-from concurrent.futures import ProcessPoolExecutor
-from dataclasses import dataclass, field, replace
-from typing import Annotated, Any
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Annotated
 
 import tyro
 from rich.console import Console
 from rich.table import Table
-from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
+from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, arg
 
-from cell.products.loading import load_product
-from experiments.cli.assemble import Assemble
-from experiments.cli.common import BadUsage, exit_code
-from experiments.reporting.output import output_folder, write_json
+from cell.configuration.config import CellConfig
+from cell.products.loading import load_product, require_product_file
+from experiments.campaigns.command import run_sweep
+from experiments.campaigns.points import trials
+from experiments.campaigns.store import read_trial, trial_file
+from experiments.campaigns.trial import Row
+from experiments.cli.common import BadUsage, Common, exit_code, split_order
+from experiments.reporting.output import output_folder
+from planning.assembly_plan.planner import plan
 from planning.operations.limits import Limit
-from planning.operations.registry import OPERATIONS
-
-Bound = tuple[str, Limit]  # Name of an operation, and one of its limits.
-Range = tuple[float, float]  # Smallest and largest value.
+from planning.operations.operation import NoOperation, Operation
+from planning.operations.sequence import steps
 
 
 @dataclass(frozen=True)
 class RepeatOptions:
-    """Options of `soft-jig assemble`, the number of runs, and the number of cores."""
+    """What to assemble, the number of runs, and the number of cores."""
 
-    assemble: OmitArgPrefixes[Assemble] = field(default_factory=Assemble)
+    product: Annotated[Positional[str], arg(metavar="PRODUCT")] = "motor_unit"
+    """A name in models/products, or a YAML file."""
+
+    order: Annotated[str | None, arg(metavar="A,B,C")] = None
+    """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
+
+    fixture: Annotated[str | None, arg(metavar="NAME")] = None
+    """What holds the parts. Default: workcell.fixture."""
 
     seeds: int = 10
     """Number of runs, with consecutive seeds from --seed."""
 
-    workers: Annotated[int, arg(metavar="CORES")] = 1
-    """Runs at a time."""
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Runs at a time. What is done already is not run again."""
+
+    common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -54,7 +63,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 
 def run_all(options: RepeatOptions) -> int:
-    """Run the assemblies, write ``summary.json`` and print the tables; return the exit code.
+    """Run what is missing of the assemblies and print the tables; return the exit code.
 
     Raises:
         InputError: An option is invalid.
@@ -62,79 +71,56 @@ def run_all(options: RepeatOptions) -> int:
     for name in ("seeds", "workers"):
         if getattr(options, name) < 1:
             raise BadUsage(f"--{name} must be >= 1, not {getattr(options, name)}.")
-    # Bad input is found once, here, instead of in every process.
-    options.assemble.common.load_config()
-    load_product(options.assemble.product)
-    console = Console(quiet=options.assemble.common.quiet, highlight=False)
-    common = options.assemble.common
-    jobs = [
-        replace(
-            options.assemble, common=replace(common, seed=s, out=common.out / str(s), quiet=True)
-        )
-        for s in range(common.seed, common.seed + options.seeds)
-    ]
+    common = options.common
+    config = common.load_config(options.fixture)
+    require_product_file(options.product)
+    operations = operations_of(options, config)
+    wanted = trials(
+        "assemble",
+        [{"order": options.order or ""}],
+        product=options.product,
+        config=config,
+        seeds=range(common.seed, common.seed + options.seeds),
+    )
     with output_folder(common.out) as out:
-        spawn = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
-            results = list(pool.map(_run, jobs))
-        bounds = [(name, limit) for name, o in OPERATIONS.items() for limit in o.limits]
-        ranges = {bound: _range(*bound, results) for bound in bounds}
-        runs = [
-            {
-                "seed": result["seed"],
-                "verdict": result["verdict"],
-                "real_time_factor": result.get("real_time_factor"),
-                "failures": _failures(result),
-            }
-            for result in results
-        ]
-        found = {f"{name}/{limit.quantity}": extremes for (name, limit), extremes in ranges.items()}
-        write_json(out / "summary.json", {"runs": runs, "ranges": found})
-    console.print(_seed_table(results))
-    console.print(_range_table(ranges))
-    return 0 if all(result["verdict"] == "success" for result in results) else 1
+        code = run_sweep(wanted, out, config, options.workers, "local", common.quiet)
+        rows = [read_trial(trial_file(out, trial.key)) for trial in wanted]
+    console = Console(quiet=common.quiet, highlight=False)
+    console.print(range_table(rows, operations))
+    return code
 
 
-def _run(job: Assemble) -> dict[str, Any]:
-    """Run one assembly; return its ``result.json``."""
-    job.run()
-    return json.loads((job.common.out / "result.json").read_text(encoding="utf-8"))
+def operations_of(options: RepeatOptions, config: CellConfig) -> Mapping[str, Operation]:
+    """Return the operation of every step of the plan, by the step's name; none if there is none."""
+    product = load_product(options.product)
+    fixing = plan(product, split_order(options.order), config=config)
+    try:
+        todo = [] if fixing.stop is not None else steps(product, fixing)
+    except NoOperation:
+        todo = []
+    return {step.name: step.operation for step in todo}
 
 
-def _range(operation: str, limit: Limit, results: Sequence[dict[str, Any]]) -> Range | None:
-    """Return the extreme values of a limited quantity over all runs and parts; None if none."""
+def range_of(limit: Limit, step: str, rows: Sequence[Row]) -> tuple[float, float] | None:
+    """Return the extreme values of a step's quantity over all runs and parts; None if none."""
     values = [
         value
-        for result in results
-        for step in result["steps"]
-        if step["operation"] == operation
-        for name, value in step["measured"].items()
-        if name.rsplit("/", 1)[-1] == limit.quantity
+        for row in rows
+        for name, value in row.measured.items()
+        if name.startswith(f"{step}/") and name.rsplit("/", 1)[-1] == limit.quantity
+        if value is not None
     ]
     return (min(values), max(values)) if values else None
 
 
-def _failures(result: dict[str, Any]) -> list[str]:
-    """Return the phase in which a run failed, or the checks that failed."""
-    if failure := result.get("failure"):
-        return [f"{failure['phase']}: {failure['evidence']}"]
-    return [check["quantity"] for step in result["steps"] for check in step["failed_checks"]]
-
-
-def _seed_table(results: Sequence[dict[str, Any]]) -> Table:
-    table = Table("seed", "verdict", "simulated s / CPU s", "failure", title="Runs")
-    for result in results:
-        speed = result.get("real_time_factor")
-        shown = "-" if speed is None else f"{speed:.3f}"
-        table.add_row(str(result["seed"]), result["verdict"], shown, "; ".join(_failures(result)))
-    return table
-
-
-def _range_table(ranges: dict[Bound, Range | None]) -> Table:
-    table = Table("operation", "quantity", "smallest", "largest", "limit", title="Over all runs")
-    for (name, limit), found in ranges.items():
-        low, high = ("-", "-") if found is None else (f"{value:.4g}" for value in found)
-        table.add_row(name, limit.quantity, low, high, f"{limit.limit:.4g}")
+def range_table(rows: Sequence[Row], operations: Mapping[str, Operation]) -> Table:
+    """Return one line per step and limited quantity: its extremes, and the limit."""
+    table = Table("step", "quantity", "smallest", "largest", "limit", title="Over all runs")
+    for step, operation in operations.items():
+        for limit in operation.limits:
+            found = range_of(limit, step, rows)
+            low, high = ("-", "-") if found is None else (f"{value:.4g}" for value in found)
+            table.add_row(step, limit.quantity, low, high, f"{limit.limit:.4g}")
     return table
 
 

@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import pytest
 
-from experiments.jig.element_tests import parameters
+from experiments.campaigns.trial import Task
 from experiments.jig.specimens import Prism
 from experiments.jig_convergence import (
-    Variation,
-    holding_force,
+    hold,
     last_refinement,
     lever,
     specimens,
     variations,
+    vented,
 )
 
 
@@ -21,18 +23,13 @@ def test_every_variation_changes_one_quantity() -> None:
 
     Only the slow drags differ in both speed and approximation.
     """
-    default = Variation("", "", parameters())
-    sequences: dict[str, list[int]] = {}
-    for variation in (each for each in variations() if each.speed == default.speed):
-        changed = [
-            variation.params.jammed != default.params.jammed,
-            variation.params.bag != default.params.bag,
-            variation.time_step != default.time_step,
-            variation.approximation != default.approximation,
-        ]
-        sequences.setdefault(variation.varied, []).append(sum(changed))
-    assert all(sorted(changed)[:2] == [0, 1] for changed in sequences.values()), sequences
-    assert all(max(changed) == 1 for changed in sequences.values())
+    default = vented()
+    sequences: dict[str, list[bool]] = {}
+    for variation in variations():
+        assert len(variation.changes) == 1
+        changed = default.with_changes(variation.changes) != default
+        sequences.setdefault(variation.varied, []).append(changed)
+    assert all(changed.count(False) == 1 for changed in sequences.values()), sequences
 
 
 def test_last_refinement_is_the_relative_change_at_the_fine_end() -> None:
@@ -46,8 +43,9 @@ def test_every_specimen_is_pushed_below_its_top() -> None:
     assert levers["lying"] == pytest.approx(0.020, abs=1e-3)
 
 
-def test_holding_force_of_a_cylinder_is_at_least_that_of_its_weight() -> None:
+def test_holding_force_of_a_cylinder_is_at_least_that_of_its_weight(tmp_path: Path) -> None:
     """0.2 kg x 9.81 x 17.5 mm over the lever arm, and less than ten times as much."""
-    force = holding_force(Prism(facets=12), Variation("", "", parameters()), depth=0.005)
+    task = Task("motor_unit", vented(), 0, tmp_path)
+    force = hold(task, specimen="standing", depth=0.005).measured["holding_N"]
     alone = 0.2 * 9.81 * 0.0175 / (lever(Prism()) + 0.005)
     assert 0.8 * alone < force < 10 * alone

@@ -52,9 +52,10 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "jig": set(),
         "plan": {"reporting"},
         "assembly": {"reporting"},
+        "campaigns": {"reporting", "assembly"},
         "speed": {"reporting", "assembly"},
-        "paper": {"reporting", "speed"},
-        "cli": {"reporting", "plan", "assembly", "paper"},
+        "paper": {"reporting", "campaigns", "speed"},
+        "cli": {"reporting", "plan", "assembly", "campaigns", "paper"},
     },
 }  # fmt: skip
 EVERYWHERE = {

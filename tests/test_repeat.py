@@ -6,17 +6,19 @@ from pathlib import Path
 import pytest
 
 from experiments import repeat
+from experiments.campaigns.trial import Row
 from planning.operations.limits import Limit
 
 
 def test_every_seed_is_run_and_its_failure_is_reported(tmp_path: Path) -> None:
-    """An infeasible order fails within a second, in its own process like any other run."""
+    """An infeasible order fails within a second, in a process like any other run."""
     options = ["--seed", "3", "--seeds", "2", "--order", "motor,bolts,plate", "--quiet"]
     assert repeat.main([*options, "--out", str(tmp_path)]) == 1
-    runs = json.loads((tmp_path / "summary.json").read_text())["runs"]
-    assert [(run["seed"], run["verdict"]) for run in runs] == [(3, "failure"), (4, "failure")]
-    assert all(run["failures"][0].startswith("plan: ") for run in runs)
-    assert (tmp_path / "4" / "result.json").is_file()
+    summary = json.loads((tmp_path / "summary.json").read_text())
+    assert (summary["seeds"], summary["failure"]) == ([3, 4], 2)
+    (phase,) = summary["failures_by_phase"]
+    assert (phase["phase"], phase["trials"]) == ("plan", 2)
+    assert len(list((tmp_path / "trials").glob("*.json"))) == 2
 
 
 @pytest.mark.parametrize(
@@ -25,6 +27,7 @@ def test_every_seed_is_run_and_its_failure_is_reported(tmp_path: Path) -> None:
         (["--seeds", "0"], "--seeds must be >= 1"),
         (["--workers", "-1"], "--workers must be >= 1"),
         (["nosuch"], "nosuch"),
+        (["--order", "motor,plate"], "bolts"),
         (["--set", "simulation.time_stop=1"], "simulation.time_stop"),
     ],
 )
@@ -38,8 +41,10 @@ def test_bad_input_is_one_line_before_any_run(
 
 
 def test_range_is_over_runs_and_parts() -> None:
-    step = {"operation": "tighten_bolts", "measured": {"b1/x": 1.0, "b2/x": -2.0, "b1/y": 9.0}}
-    other = {"operation": "place_bolts", "measured": {"b1/x": 50.0}}
-    results = [{"steps": [step, other]}, {"steps": [{**step, "measured": {"b1/x": 3.0}}]}]
-    assert repeat._range("tighten_bolts", Limit("x", 1.0, "", "parts"), results) == (-2.0, 3.0)
-    assert repeat._range("pick_place", Limit("x", 1.0, ""), results) is None
+    def row(**measured: float) -> Row:
+        found = {f"tighten/{k.replace('_', '/')}": value for k, value in measured.items()}
+        return Row("", "assemble", "", 0, {}, {}, {}, "success", measured=found | {"place/x": 50.0})
+
+    rows = [row(b1_x=1.0, b2_x=-2.0, b1_y=9.0), row(b1_x=3.0)]
+    assert repeat.range_of(Limit("x", 1.0, "", "parts"), "tighten", rows) == (-2.0, 3.0)
+    assert repeat.range_of(Limit("x", 1.0, ""), "pick", rows) is None

@@ -12,7 +12,7 @@ from cell import CellConfig, load_product
 from cell.errors import BadPart, UnknownName
 from cell.fixtures.soft_jig import SurfaceSamples
 from cell.simulation.phase import PhaseFailed
-from experiments.paper.cases import Case, case_seed, judged, wilson
+from experiments.paper.cases import Case, case_seed, judged
 from experiments.paper.postures import AXES, POSTURES, PUSHES, chosen
 from experiments.paper.push_rule import push_line
 from experiments.paper.rest import Rest
@@ -22,6 +22,7 @@ from experiments.paper.rig.stage import Observer
 from experiments.paper.rig_hand import RigBench, tip_pose
 from experiments.paper.trial import TrialDisturbance, check_fits, planned_pose, run_trial
 from experiments.paper.trial_metrics import tilt_between
+from experiments.reporting.statistics import wilson
 
 
 @pytest.fixture(scope="module")

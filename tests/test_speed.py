@@ -140,7 +140,7 @@ def test_regress_warns_of_a_slower_class_and_does_not_fail(
     speeds = iter([{"contact": 100.0}, {"contact": now}])
     monkeypatch.setattr(regress, "run_suite", lambda *_: ({}, next(speeds)))
     for update in (True, False):
-        assert regress.run_regress("quick", update, CellConfig(), tmp_path, quiet=False) == 0
+        assert regress.run_regress("quick", update, CellConfig(), tmp_path, 1, quiet=False) == 0
     assert json.loads((tmp_path / "quick.json").read_text())["speed"] == {"contact": 100.0}
     assert ("Warning: 'contact' takes 30% more" in capsys.readouterr().out) is warned
     result = json.loads((tmp_path / "result.json").read_text())

@@ -18,7 +18,7 @@ from cell.products.product import Product
 def identity_of(cell: Cell) -> dict[str, str]:
     """Return product, configuration, bodies and Drake's version of a cell, as digests."""
     return {
-        "product": f"{cell.product.name} {_digest_of(cell.product)}",
+        "product": f"{cell.product.name} {product_digest(cell.product)}",
         "configuration": _digest(json.dumps(cell.config.to_dict(), sort_keys=True, default=str)),
         "set of bodies": _digest("\n".join(_bodies(cell))),
         "Drake": version("drake"),
@@ -45,7 +45,7 @@ def _digest(text: str) -> str:
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 
-def _digest_of(product: Product) -> str:
+def product_digest(product: Product) -> str:
     """Return a digest of what a product's file and meshes say about its parts and joints."""
     digest = hashlib.sha256(repr(product.joints).encode())
     for part in product.parts.values():

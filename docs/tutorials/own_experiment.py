@@ -1,10 +1,8 @@
 """Your own experiment: how hard the frozen bag holds a part, over the vacuum.
 
 A box is pressed into the bag with 20 N; the pump draws a vacuum; then it is pulled up, harder and
-harder, until it comes off. Every trial is a new Context of one diagram, so trials are independent.
+harder, until it comes off. A campaign runs a trial for each vacuum and keeps it in a file.
 """
-
-import csv
 
 import numpy as np
 from pydrake.common.value import Value
@@ -15,14 +13,13 @@ from pydrake.multibody.plant import ExternallyAppliedSpatialForce
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.analysis import Simulator
 
-from cell import CellConfig, Product, build_cell
+from cell import Product, build_cell
+from experiments import Outcome, grid, run_campaign, trials
 
 SIZE = np.array([0.03, 0.03, 0.06])  # Of the box [m].
 WEIGHT = 0.2 * 9.81  # [N]
-PRESS = 20.0  # [N], for half a second.
 RATE = 60.0  # Growth of the pull [N/s].
 OFF = 2e-3  # A box that has risen this far is off [m].
-VACUUMS = (15e3, 45e3, 90e3)  # [Pa]
 
 
 def add_box(plant, scene_graph):
@@ -38,7 +35,7 @@ class Trial:
     """One box on one bag.
 
     Args:
-        cell: Built once for all trials.
+        cell: With the box in it.
     """
 
     def __init__(self, cell):
@@ -66,10 +63,14 @@ class Trial:
         port.FixValue(self.root, Value([force]))
         self.simulator.AdvanceTo(self.root.get_time() + seconds)
 
-    def holding_force(self, vacuum):
-        """Return the pull at which the box comes off, less its weight [N]."""
-        self.run(0.5, -PRESS)
-        self.cell.diagram.GetInputPort("jig.vacuum").FixValue(self.root, vacuum)
+    def holding_force(self, press):
+        """Return the pull at which the box comes off, less its weight [N].
+
+        Args:
+            press: Force that presses it in, for half a second [N].
+        """
+        self.run(0.5, -press)
+        self.cell.fixture.fix(self.root)
         self.run(0.9, 0.0)
         assert self.cell.fixture.fixed(self.root)
         held, pull = self.height(), WEIGHT
@@ -79,10 +80,16 @@ class Trial:
         return pull - WEIGHT
 
 
-cell = build_cell(CellConfig.load(), Product(), extend=add_box)
-rows = [(vacuum, Trial(cell).holding_force(vacuum)) for vacuum in VACUUMS]
-with open("holding.csv", "w", newline="") as file:
-    csv.writer(file).writerows([("vacuum_Pa", "holding_N"), *rows])
-for vacuum, force in rows:
-    print(f"vacuum {1e-3 * vacuum:4.0f} kPa: the bag holds {force:5.1f} N")
-assert np.all(np.diff([force for _, force in rows]) > 0)
+def hold(task, *, press=20.0):
+    """Measure the holding force of one bag: one trial of a campaign."""
+    cell = build_cell(task.config, Product(), extend=add_box)
+    return Outcome(True, {"holding_N": Trial(cell).holding_force(press)})
+
+
+if __name__ == "__main__":  # Worker processes import this file, too.
+    points = grid({"jig.vacuum.pressure": [15e3, 45e3, 90e3]})
+    rows = run_campaign(trials(hold, points), "holding", workers=1)
+    for row in rows:
+        vacuum, force = row.varied["jig.vacuum.pressure"], row.measured["holding_N"]
+        print(f"vacuum {1e-3 * vacuum:4.0f} kPa: the bag holds {force:5.1f} N")
+    assert np.all(np.diff([row.measured["holding_N"] for row in rows]) > 0)

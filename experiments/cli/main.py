@@ -22,19 +22,21 @@ from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
 from experiments.cli.paper import Place, Push, Regress
 from experiments.cli.plan import Plan
+from experiments.cli.sweep import Sweep
 
 DESCRIPTION = """\
 A digital twin of a dual-arm assembly cell with a soft jig.
 Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
 --version prints the versions of the twin and of Drake.
 """
-Command = Plan | Assemble | Place | Push | Regress
+Command = Plan | Assemble | Place | Push | Regress | Sweep
 COMMANDS: dict[str, type[Command]] = {
     "plan": Plan,
     "assemble": Assemble,
     "place": Place,
     "push": Push,
     "regress": Regress,
+    "sweep": Sweep,
 }
 
 

@@ -21,6 +21,9 @@ class Place:
     trials: int = 10
     """Trials of each case."""
 
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Trials at a time. What is done already is not run again."""
+
     hand: Literal["rig", "robot"] = "rig"
     """What carries the gripper: a position-controlled rig, or the arm, with planned motions."""
 
@@ -46,6 +49,9 @@ class Push:
 
     trials: int = 5
     """Trials of each case."""
+
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Trials at a time. What is done already is not run again."""
 
     hand: Literal["rig", "robot"] = "rig"
     """What carries the gripper: a position-controlled rig, or the arm, with planned motions."""
@@ -73,6 +79,9 @@ class Regress:
     update: bool = False
     """Store what comes out, and print what changes."""
 
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Trials at a time. What is done already is not run again."""
+
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
     def run(self) -> int:
@@ -80,20 +89,26 @@ class Regress:
         config = self.common.load_config()
         if self.common.seed != 0:
             raise BadUsage("The stored metrics are those of --seed 0: leave it out.")
+        from experiments.paper.place_push import check_numbers
+
+        check_numbers(workers=self.workers)
         with output_folder(self.common.out) as out:
             from experiments.paper.regress import run_regress
 
-            return run_regress(self.suite, self.update, config, out, self.common.quiet)
+            return run_regress(
+                self.suite, self.update, config, out, self.workers, self.common.quiet
+            )
 
 
 def _run_experiment(command: str, options: Place | Push) -> int:
     """Check everything that was asked for, then run it."""
     from experiments.paper.case_results import Experiment
-    from experiments.paper.place_push import cases_of, check_trials, run_experiment, with_pressure
+    from experiments.paper.cases import cases_of
+    from experiments.paper.place_push import check_numbers, run_experiment, with_pressure
 
     common = options.common
     config = with_pressure(common.load_config(options.fixture), options.pressure)
-    check_trials(options.trials)
+    check_numbers(trials=options.trials, workers=options.workers)
     cases_of(command, options.case)
     with output_folder(common.out) as out:
         experiment = Experiment(
@@ -104,5 +119,6 @@ def _run_experiment(command: str, options: Place | Push) -> int:
             common.seed,
             out,
             common.quiet,
+            options.workers,
         )
         return run_experiment(experiment, options.case)

@@ -63,6 +63,7 @@ class Experiment:
         seed: Of the disturbances.
         out: Existing folder for the results.
         quiet: Whether to print nothing.
+        workers: Trials at a time.
     """
 
     command: str
@@ -72,6 +73,7 @@ class Experiment:
     seed: int
     out: Path
     quiet: bool = False
+    workers: int = 1
 
 
 def verdict(results: Sequence[CaseResult]) -> str:
@@ -83,8 +85,6 @@ def write_case_results(
     experiment: Experiment, results: Sequence[CaseResult], pictures: Sequence[Picture], notes
 ) -> None:
     """Write ``result.json`` and ``report.html`` into the folder of the experiment."""
-    for name in ("result.json", "report.html"):
-        (experiment.out / name).unlink(missing_ok=True)
     result = summary(experiment, results)
     push = experiment.command == "push"
     failures = [

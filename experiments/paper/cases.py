@@ -1,35 +1,22 @@
-"""Run and judge the cases of the place and push experiments, trial by trial."""
+"""The cases of the place and push experiments, and the verdict on their trials."""
 
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 
 import numpy as np
-from scipy.stats import binomtest
 
-from cell.configuration.config import CellConfig
-from cell.products.product import Product
-from experiments.paper.postures import Posture, PushSpec
-from experiments.paper.rig.stage import Observer
-from experiments.paper.rig_hand import RigBench
-from experiments.paper.robot_hand import RobotBench
-from experiments.paper.trial import (
-    Bench,
-    TrialDisturbance,
-    TrialRecord,
-    check_fits,
-    ignore,
-    run_trial,
-)
+from cell.errors import UnknownName
+from experiments.paper.postures import POSTURES, PUSHES, Posture, PushSpec, chosen
+from experiments.paper.trial import TrialRecord
 from experiments.paper.trial_metrics import (
     measure_place,
     measure_push,
     place_succeeded,
     push_succeeded,
 )
+from experiments.reporting.statistics import wilson
 
 
 @dataclass(frozen=True)
@@ -111,56 +98,36 @@ class CaseResult:
         return {name: float(self.values(name).mean()) for name in names}
 
 
-def wilson(successes: int, trials: int) -> tuple[float, float]:
-    """Return Wilson's 95 % interval of a success rate."""
-    interval = binomtest(successes, trials).proportion_ci(0.95, method="wilson")
-    return float(interval.low), float(interval.high)
+def cases_of(command: str, label: str | None) -> list[Case]:
+    """Return the cases of an experiment that a label selects; None selects all.
+
+    Args:
+        command: "place" or "push".
+        label: Of a case, a posture or a part.
+
+    Raises:
+        UnknownName: No case has this label.
+    """
+    if command == "place":
+        return [Case(posture) for posture in chosen("posture to place", POSTURES, label)]
+    return [Case(push.posture, push) for push in chosen("case to push", PUSHES, label)]
+
+
+def case_named(command: str, label: str) -> Case:
+    """Return the one case of an experiment with a label.
+
+    Raises:
+        UnknownName: No case has this label.
+    """
+    found = {case.label: case for case in cases_of(command, None)}
+    if label not in found:
+        raise UnknownName(f"case to {command}", label, found)
+    return found[label]
 
 
 def case_seed(seed: int, label: str, trial: int) -> np.random.Generator:
     """Return the random generator of one trial, independent of the other cases that are run."""
     return np.random.default_rng([seed, zlib.crc32(label.encode()), trial])
-
-
-def run_cases(
-    cases: Sequence[Case],
-    *,
-    product: Product,
-    config: CellConfig,
-    trials: int,
-    seed: int,
-    hand: str = "rig",
-    watch: Callable[[Case, str, Observer], None] | None = None,
-) -> Iterator[tuple[CaseResult, TrialResult]]:
-    """Run every trial of every case; yield each when it is done, with the results of its case.
-
-    Args:
-        cases: To run.
-        product: With the parts.
-        config: Of the cell, the same for all cases.
-        trials: Of each case.
-        seed: Of the disturbances, which are the same for both hands.
-        hand: "rig" or "robot".
-        watch: Called with the events of the first trial of each case.
-
-    Raises:
-        BadPart: Before any trial: a part is wider than the bag.
-    """
-    for case in cases:
-        check_fits(config, product.parts[case.posture.part], case.posture)
-    for case in cases:
-        bench: Bench
-        if hand == "robot":
-            bench = RobotBench.build(config, product, case.posture, case.push)
-        else:
-            bench = RigBench.build(config, product, case.posture)
-        result = CaseResult(case)
-        for k in range(trials):
-            disturbance = TrialDisturbance.draw(config, case_seed(seed, case.label, k))
-            follow = ignore if watch is None or k > 0 else partial(watch, case)
-            trial = run_trial(bench.begin(disturbance), case.push, follow)
-            result.trials.append(judged(case, trial))
-            yield result, result.trials[-1]
 
 
 def judged(case: Case, trial: TrialRecord) -> TrialResult:

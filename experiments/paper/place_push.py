@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
 from pydrake.math import RigidTransform
 from rich.console import Console
-from rich.progress import Progress
 
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.products.loading import load_product
-from experiments.paper.case_results import Experiment, case_table, verdict, write_case_results
-from experiments.paper.cases import Case, CaseResult, run_cases
-from experiments.paper.postures import POSTURES, PUSHES, chosen
-from experiments.paper.rig.stage import Observer
-from experiments.reporting.render import View, rendering_problem, take_picture
-from experiments.reporting.report import Picture
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.campaigns.store import trial_folder
+from experiments.campaigns.trial import Row
+from experiments.paper.case_results import (
+    Experiment,
+    case_table,
+    summary,
+    verdict,
+    write_case_results,
+)
+from experiments.paper.cases import Case, CaseResult, TrialResult, cases_of
+from experiments.paper.trial import TrialRecord, check_fits
+from experiments.paper.trial_tasks import CRITERION, LOG, PICTURES, from_arrays
+from experiments.reporting.html_page import Picture
+from experiments.reporting.output import write_json
+from experiments.reporting.render import rendering_problem
+from experiments.speed.meter import Meter
 
-PICTURED = {"place": ("placed",), "push": ("before", "after", "end")}
-
-
-def cases_of(command: str, label: str | None) -> list[Case]:
-    """Return the cases of an experiment that a label selects; None selects all.
-
-    Raises:
-        UnknownName: No case has this label.
-    """
-    if command == "place":
-        return [Case(posture) for posture in chosen("posture to place", POSTURES, label)]
-    return [Case(push.posture, push) for push in chosen("case to push", PUSHES, label)]
+PRODUCT = "motor_unit"
 
 
 def with_pressure(config: CellConfig, pressure_kpa: float | None) -> CellConfig:
@@ -37,68 +41,100 @@ def with_pressure(config: CellConfig, pressure_kpa: float | None) -> CellConfig:
     return config.with_changes({"jig.vacuum.pressure": 1e3 * pressure_kpa})
 
 
-def check_trials(trials: int) -> None:
-    """Raise `InputError` unless the number of trials is positive."""
-    if trials < 1:
-        raise InputError(f"--trials must be at least 1, not {trials}.")
+def check_numbers(**numbers: int) -> None:
+    """Raise `InputError` unless every number, of an option by this name, is positive."""
+    for name, number in numbers.items():
+        if number < 1:
+            raise InputError(f"--{name} must be at least 1, not {number}.")
 
 
 def run_experiment(experiment: Experiment, label: str | None) -> int:
-    """Run the cases that a label selects; write result and report.
+    """Run the cases that a label selects, as a campaign; write result and report.
 
     Returns:
-        0 if every case came out as expected, else 1.
+        0 if every case came out as expected, else 1; 3 if a trial came to no verdict.
     """
     cases = cases_of(experiment.command, label)
+    parts = load_product(PRODUCT).parts
+    for case in cases:
+        check_fits(experiment.config, parts[case.posture.part], case.posture)
     console = Console(quiet=experiment.quiet, highlight=False)
-    album = _Album(experiment)
-    results: dict[str, CaseResult] = {}
-    hidden = console.quiet or not console.is_terminal
-    with Progress(console=console, transient=True, disable=hidden) as bar:
-        task = bar.add_task("", total=len(cases) * experiment.trials)
-        done = run_cases(
-            cases,
-            product=load_product("motor_unit"),
+    done: list[Row] = []
+
+    def ended(row: Row) -> None:
+        done.append(row)
+        running = summary(experiment, results_of(cases, done, experiment.out))
+        write_json(experiment.out / "result.json", running | {"verdict": "running"})
+
+    points = [
+        {"case": case.label, "hand": experiment.hand, "number": number}
+        for case in cases
+        for number in range(experiment.trials)
+    ]
+    rows = run_campaign(
+        trials(
+            experiment.command,
+            points,
+            product=PRODUCT,
             config=experiment.config,
-            trials=experiment.trials,
-            seed=experiment.seed,
-            hand=experiment.hand,
-            watch=album.take,
-        )
-        for result, trial in done:
-            results[result.case.label] = result
-            bar.update(task, advance=1, description=result.case.label)
-            word = "success" if trial.success else "failure"
-            console.print(f"{result.case.label} {len(result.trials)}: {word}", markup=False)
-    found = list(results.values())
-    write_case_results(experiment, found, album.pictures, album.notes)
+            seeds=[experiment.seed],
+        ),
+        experiment.out,
+        workers=experiment.workers,
+        about={"command": experiment.command},
+        console=console,
+        ended=ended,
+        report=False,
+    )
+    found = results_of(cases, rows, experiment.out)
+    write_case_results(experiment, found, *_pictures(experiment, rows))
     console.print(case_table(experiment.command, found))
+    if not all(row.done for row in rows):
+        return 3
     return 0 if verdict(found) == "success" else 1
 
 
-class _Album:
-    """Pictures of the first trial of each case, if the machine can render."""
+def results_of(cases: Sequence[Case], rows: Sequence[Row], out: Path) -> list[CaseResult]:
+    """Return the results of the cases of which a trial has ended.
 
-    def __init__(self, experiment: Experiment) -> None:
-        self.wanted = PICTURED[experiment.command]
-        self.pictures: list[Picture] = []
-        problem = rendering_problem()
-        self.notes = [] if problem is None else [f"No pictures: {problem}."]
-
-    def take(self, case: Case, event: str, observer: Observer) -> None:
-        """Take the picture of an event, for the end only if the trial stopped early."""
-        last = self.pictures[-1][0] if self.pictures else ""
-        ended_early = event == "end" and last != f"{case.label}: after"
-        if self.notes or event not in self.wanted or (event == "end" and not ended_early):
-            return
-        view = view_of(observer.stage.config.workcell.X_WJ)
-        caption = f"{case.label}: {event}"
-        scene = take_picture(observer.stage.scene_graph, observer.root, view)
-        self.pictures.append((caption, scene))
+    Args:
+        cases: Of the experiment.
+        rows: Of the trials that have ended.
+        out: Folder of the campaign, in which their logs are.
+    """
+    found = [
+        CaseResult(case, [_result(row, out) for row in rows if row.options["case"] == case.label])
+        for case in cases
+    ]
+    return [result for result in found if result.trials]
 
 
-def view_of(X_WJ: RigidTransform) -> View:
-    """Return a camera that sees the jig and 70 mm to each side."""
-    p_WJ = X_WJ.translation()
-    target = tuple(p_WJ + [0.0, 0.0, 0.05])
-    return View(p_WC=tuple(p_WJ + [0.35, -0.45, 0.28]), p_WTarget=target, width=720, height=480)
+def _result(row: Row, out: Path) -> TrialResult:
+    """Return a trial with its log; one that came to no verdict has none."""
+    trial = TrialRecord(planned=RigidTransform())
+    if row.done:
+        with np.load(trial_folder(out, row.key) / LOG) as arrays:
+            trial, _ = from_arrays(dict(arrays))
+    stopped = row.verdict != "success" and row.phase != CRITERION
+    failure = (row.phase or row.verdict, row.evidence) if stopped else None
+    measured = {name: value for name, value in row.measured.items() if value is not None}
+    return TrialResult(row.verdict == "success", measured, failure, trial)
+
+
+def timed(row: Row, out: Path) -> tuple[Meter, float]:
+    """Return what a trial spent, and the CPU time of a kernel iteration meanwhile [s]."""
+    with np.load(trial_folder(out, row.key) / LOG) as arrays:
+        trial, kernel = from_arrays(dict(arrays))
+    return trial.meter, kernel
+
+
+def _pictures(experiment: Experiment, rows: Sequence[Row]) -> tuple[list[Picture], list[str]]:
+    """Return the pictures of the first trial of each case, and why there are none."""
+    problem = rendering_problem()
+    found = []
+    for row in rows:
+        for event in PICTURES[experiment.command]:
+            file = trial_folder(experiment.out, row.key) / f"{event}.png"
+            if file.exists():
+                found.append((f"{row.options['case']}: {event}", file.read_bytes()))
+    return found, [] if problem is None else [f"No pictures: {problem}."]

@@ -22,15 +22,15 @@ from rich.console import Console
 from rich.table import Table
 
 from cell.configuration.config import CellConfig
-from cell.errors import InputError
+from cell.errors import InputError, RunFailure
 from cell.paths import MODELS
-from cell.products.loading import load_product
-from experiments.paper.cases import Case, CaseResult, run_cases
-from experiments.paper.place_push import cases_of
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.paper.cases import CaseResult, cases_of
+from experiments.paper.place_push import PRODUCT, results_of, timed
 from experiments.reporting.output import write_json
 from experiments.reporting.provenance import finite, versions
-from experiments.speed.calibration import Kernel
-from experiments.speed.meter import Meter, changes, ratios, slower
+from experiments.speed.meter import changes, ratios, slower
 
 BASELINE = MODELS / "regression"
 SEED = 0
@@ -166,30 +166,43 @@ def drifts(stored: Metrics, now: Metrics) -> list[Drift]:
 
 
 def run_suite(
-    suite: Suite, config: CellConfig, console: Console
+    suite: Suite, config: CellConfig, out: Path, workers: int, console: Console
 ) -> tuple[dict[str, CaseResult], Ratios]:
-    """Run every case of a suite; return the results by "experiment case", and the ratios."""
-    results: dict[str, CaseResult] = {}
-    kernel = Kernel()
-    spent: list[tuple[Meter, float]] = []
-    before = kernel.time()
-    for command, label in suite.cases:
-        cases: list[Case] = cases_of(command, label)
-        done = run_cases(
-            cases,
-            product=load_product("motor_unit"),
+    """Run every case of a suite; return the results by "experiment case", and the ratios.
+
+    Args:
+        suite: Of cases.
+        config: Of the cell.
+        out: Folder for the trials; those that have ended there are not run again.
+        workers: Trials at a time.
+        console: Where to show progress.
+
+    Raises:
+        RunFailure: A trial came to no verdict.
+    """
+    cases = [(name, case) for name, label in suite.cases for case in cases_of(name, label)]
+    wanted = [
+        trial
+        for command, case in cases
+        for trial in trials(
+            command,
+            [{"case": case.label, "number": k, "timed": True} for k in range(suite.trials)],
+            product=PRODUCT,
             config=config,
-            trials=suite.trials,
-            seed=SEED,
+            seeds=[SEED],
         )
-        for result, trial in done:
-            results[f"{command} {result.case.label}"] = result
-            cpu = trial.trial.cpu_seconds
-            console.print(f"{command} {result.case.label}: {cpu:.1f} s of CPU", markup=False)
-            after = kernel.time()
-            spent.append((trial.trial.meter, (before + after) / 2))
-            before = after
-    return results, ratios(spent)
+    ]
+    about = {"command": "regress", "suite": suite.name}
+    rows = run_campaign(wanted, out, workers=workers, about=about, console=console, report=False)
+    for row in rows:
+        if not row.done:
+            raise RunFailure(f"{row.experiment} {row.options['case']}: {row.evidence}")
+    results = {
+        f"{command} {case.label}": result
+        for command, case in cases
+        for result in results_of([case], rows, out)
+    }
+    return results, ratios(timed(row, out) for row in rows)
 
 
 def read_baseline(path: Path) -> Baseline:
@@ -207,7 +220,9 @@ def read_baseline(path: Path) -> Baseline:
         raise InputError(f"Cannot read the stored metrics '{path}': {error}.") from error
 
 
-def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, quiet: bool) -> int:
+def run_regress(
+    suite_name: str, update: bool, config: CellConfig, out: Path, workers: int, quiet: bool
+) -> int:
     """Run a suite and compare it with the baseline, or update the baseline.
 
     Returns:
@@ -220,7 +235,7 @@ def run_regress(suite_name: str, update: bool, config: CellConfig, out: Path, qu
     if stored.drake != drake:
         text = f"The stored metrics hold for Drake {stored.drake}; this is {drake}."
         console.print(text, markup=False, soft_wrap=True)
-    results, speed = run_suite(suite, config, console)
+    results, speed = run_suite(suite, config, out, workers, console)
     now = metrics_of(results)
     rows = drifts(stored.cases, now)
     shown = [row for row in rows if row.stored != row.now] if update else rows

@@ -1,0 +1,70 @@
+"""The experiment "assemble": a trial is one whole assembly, or one up to an operation."""
+
+from __future__ import annotations
+
+from cell.products.loading import load_product
+from experiments.assembly.prepare import RunningCell
+from experiments.assembly.run import Run, StepResult
+from experiments.campaigns.trial import Outcome, Task
+from experiments.reporting.output import write_arrays
+from planning.assembly_plan.explain import stop_text
+from planning.assembly_plan.planner import plan
+from planning.operations.operation import NoOperation, Step
+from planning.operations.registry import operation_named
+from planning.operations.sequence import steps
+
+
+def assemble(task: Task, *, order: str = "", last: str = "") -> Outcome:
+    """Plan and assemble a product; a run that stops early leaves ``failed_state.npz``.
+
+    Args:
+        task: Product, configuration, seed.
+        order: Parts or groups, separated by commas; "" for the product's first one.
+        last: Name of the operation to stop after; "" for the whole assembly.
+    """
+    product = load_product(task.product)
+    product.check_simulable()
+    wanted = tuple(item.strip() for item in order.split(",")) if order else None
+    fixing = plan(product, wanted, config=task.config)
+    if fixing.stop is not None:
+        return Outcome(False, phase="plan", evidence=stop_text(fixing))
+    try:
+        todo = _up_to(steps(product, fixing), last)
+    except NoOperation as reason:
+        return Outcome(False, phase="plan", evidence=str(reason))
+    run = Run(RunningCell(product, task.config, task.seed))
+    run.run(todo)
+    if run.failure is not None:
+        write_arrays(task.file("failed_state.npz"), run.failure.state)
+    return outcome_of(run)
+
+
+def _up_to(todo: list[Step], last: str) -> list[Step]:
+    """Return the steps up to the first with an operation; all if there is none of that name."""
+    if not last:
+        return todo
+    operations = [step.operation for step in todo]
+    wanted = operation_named(last)
+    return todo[: operations.index(wanted) + 1] if wanted in operations else todo
+
+
+def outcome_of(run: Run) -> Outcome:
+    """Return what came out of a run; the name of a quantity begins with that of its step."""
+    measured = {
+        f"{step.name}/{name}": value for step in run.steps for name, value in step.measured.items()
+    }
+    phase, evidence = "", ""
+    if run.failure is not None:
+        phase, evidence = run.failure.phase, run.failure.evidence
+    elif run.verdict != "success":
+        step = next(step for step in run.steps if step.verdict != "success")
+        phase, evidence = f"{step.name}: checks", _failed_checks(step)
+    return Outcome(run.verdict == "success", measured, phase, evidence)
+
+
+def _failed_checks(step: StepResult) -> str:
+    texts = []
+    for check in step.failed_checks:
+        value = "not measured" if check.value is None else f"{check.value:.4g}"
+        texts.append(f"{check.quantity} is {value}, limit {check.limit:.4g}: {check.reason}")
+    return "; ".join(texts)
