@@ -4,20 +4,16 @@
 
 Runs three assemblies with several seeds, every placement and every push, each in three ways: as
 configured, with full contact, and with full contact at half the time step. A quantity that the
-default changes by more than the step does is marked. A run whose result is in the folder already is
-not repeated. Prints the tables, and writes them to study.json.
+default changes by more than the step does is marked. Prints the tables, and writes them to
+study.json.
 """
 
 from __future__ import annotations
 
-import json
-import multiprocessing
 import sys
-from collections.abc import Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated
 
 import numpy as np
 import tyro
@@ -25,10 +21,14 @@ from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
-from experiments.cli.assemble import Assemble
+from cell.configuration.config import CellConfig
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.campaigns.trial import Row, Trial
 from experiments.cli.common import BadUsage, Common, exit_code
-from experiments.cli.paper import Place, Push
+from experiments.paper.cases import cases_of
 from experiments.reporting.output import output_folder, write_json
+from experiments.reporting.provenance import finite
 
 DEFAULT, FULL, HALF = "default", "full", "full, half step"
 HALVED = 0.5e-3  # [s]
@@ -38,11 +38,11 @@ WAYS = {
     HALF: ("simulation.contact=full", f"simulation.time_step={HALVED:g}"),
 }
 ASSEMBLIES = {
-    "motor unit": ("motor_unit", None),
+    "motor unit": ("motor_unit", ""),
     "motor unit, second order": ("motor_unit", "plate,bolts,motor"),
-    "idler": ("idler", None),
+    "idler": ("idler", ""),
 }
-RIG = {"place": Place, "push": Push}
+RIG = ("place", "push")
 RIG_QUANTITIES = ("displacement_m", "push_shear_peak_N", "depth_m", "tilt_rad")
 
 
@@ -53,87 +53,67 @@ class StudyOptions:
     seeds: int = 3
     """Seeds of each assembly, from 0; the experiments on the rig run one trial of seed 0."""
 
-    workers: Annotated[int, arg(metavar="CORES")] = 1
-    """Runs at a time."""
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Runs at a time. What is done already is not run again."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
 
 @dataclass(frozen=True)
 class StudyRun:
-    """One run of the study.
+    """One trial of the study.
 
     Attributes:
         name: Of an assembly, or "place" or "push".
+        where: Case of an experiment on the rig; "" for an assembly.
         way: How its contact is computed.
         seed: Of the run.
     """
 
     name: str
+    where: str
     way: str
     seed: int
 
-    @property
-    def folder(self) -> str:
-        """In that of the study."""
-        return f"{self.name} {self.way} {self.seed}".replace(",", "").replace(" ", "_")
-
-    def common(self, options: StudyOptions) -> Common:
-        """Return the options of the command that carries it out."""
-        own = options.common
-        overrides = (*own.overrides, *WAYS[self.way])
-        out = own.out / self.folder
-        return replace(own, overrides=overrides, seed=self.seed, out=out, quiet=True)
+    def trial(self, config: CellConfig) -> Trial:
+        """Return the trial of a campaign that carries it out."""
+        config = config.with_changes(WAYS[self.way])
+        if self.name in RIG:
+            (trial,) = trials(self.name, [{"case": self.where}], config=config, seeds=[self.seed])
+            return trial
+        product, order = ASSEMBLIES[self.name]
+        point = {"order": order}
+        (trial,) = trials("assemble", [point], product=product, config=config, seeds=[self.seed])
+        return trial
 
 
 def study_runs(seeds: int) -> list[StudyRun]:
     """Return all runs of the study, the longest ones first."""
+    ways = (HALF, FULL, DEFAULT)
     assemblies = [
-        StudyRun(name, way, seed) for way in (HALF, FULL, DEFAULT) for name in ASSEMBLIES
-        for seed in range(seeds)
-    ]  # fmt: skip
-    return assemblies + [StudyRun(name, way, 0) for way in (HALF, FULL, DEFAULT) for name in RIG]
+        StudyRun(name, "", way, k) for way in ways for name in ASSEMBLIES for k in range(seeds)
+    ]
+    rig = [
+        StudyRun(name, case.label, way, 0)
+        for way in ways
+        for name in RIG
+        for case in cases_of(name, None)
+    ]
+    return assemblies + rig
 
 
-def carry_out(options: StudyOptions, run: StudyRun) -> dict[str, Any]:
-    """Return the result of a run, from its folder if it is there."""
-    common = run.common(options)
-    file = common.out / "result.json"
-    if not file.exists():
-        if run.name in RIG:
-            RIG[run.name](trials=1, common=common).run()
-        else:
-            product, order = ASSEMBLIES[run.name]
-            Assemble(product, order=order, common=common).run()
-    return json.loads(file.read_text(encoding="utf-8"))
+Values = dict[tuple[str, str], np.ndarray]  # By step or case and quantity, over bolts.
 
 
-Values = dict[tuple[str, str], np.ndarray]  # By operation and quantity, over bolts.
-
-
-def assembly_values(result: dict[str, Any]) -> Values:
-    """Return what was measured in an assembly; that of several bolts is one array."""
+def values_of(run: StudyRun, row: Row) -> Values:
+    """Return what was measured in a run; that of several bolts is one array."""
     found: dict[tuple[str, str], list[float]] = {}
-    for step in result["steps"]:
-        for name, value in step["measured"].items():
-            key = step["name"], name.rpartition("/")[2]
-            found.setdefault(key, []).append(np.nan if value is None else float(value))
+    for name, value in row.measured.items():
+        step, _, quantity = name.rpartition("/")
+        if run.name not in RIG or quantity in RIG_QUANTITIES:
+            key = run.where or step.partition("/")[0], quantity
+            found.setdefault(key, []).append(np.nan if value is None else value)
     return {key: np.array(values) for key, values in found.items()}
-
-
-def rig_values(result: dict[str, Any]) -> Values:
-    """Return what was measured in the cases of an experiment."""
-    return {
-        (label(case), name): np.array([case["measured"][name]])
-        for case in result["cases"]
-        for name in RIG_QUANTITIES
-        if case["measured"].get(name) is not None
-    }
-
-
-def label(case: dict[str, Any]) -> str:
-    """Return the label of a case, for example "motor/P2/a"."""
-    return "/".join(case[key] for key in ("part", "posture", "direction") if key in case)
 
 
 @dataclass(frozen=True)
@@ -177,18 +157,13 @@ def compare(name: str, ways: dict[str, list[Values]]) -> Iterator[Compared]:
         yield Compared(name, *key, float(np.mean(rows[FULL])), changed, by_step)
 
 
-def outcome_table(results: dict[StudyRun, dict[str, Any]]) -> Table:
-    """Return verdicts and CPU times of all runs, and of each case of the rig."""
+def outcome_table(rows: Mapping[StudyRun, Row]) -> Table:
+    """Return verdict and CPU time of every run."""
     table = Table("", "seed", *WAYS, title="Outcomes, and CPU time [s]", title_justify="left")
-    for run in (run for run in results if run.way == FULL):
-        own = [results[replace(run, way=way)] for way in WAYS]
-        if run.name not in RIG:
-            cells = [f"{r['verdict']} {sum(s['cpu_seconds'] for s in r['steps']):.0f}" for r in own]
-            table.add_row(run.name, str(run.seed), *cells)
-            continue
-        for k, case in enumerate(own[1]["cases"]):
-            cells = ["success" if r["cases"][k]["successes"] else "failure" for r in own]
-            table.add_row(f"{run.name} {label(case)}", str(run.seed), *cells)
+    for run in (run for run in rows if run.way == FULL):
+        own = [rows[replace(run, way=way)] for way in WAYS]
+        cells = [f"{row.verdict} {row.cpu_seconds:.0f}" for row in own]
+        table.add_row(f"{run.name} {run.where}".rstrip(), str(run.seed), *cells)
     return table
 
 
@@ -211,36 +186,43 @@ def run(options: StudyOptions) -> int:
     for name in ("seeds", "workers"):
         if getattr(options, name) < 1:
             raise BadUsage(f"--{name} must be >= 1, not {getattr(options, name)}.")
-    wanted = study_runs(options.seeds)
-    for each in wanted:
-        each.common(options).load_config()  # Bad values are refused before hours of computation.
+    config = options.common.load_config()
+    # Bad values are refused before hours of computation.
+    wanted = {run: run.trial(config) for run in study_runs(options.seeds)}
     console = Console(quiet=options.common.quiet, highlight=False)
-    results: dict[StudyRun, dict[str, Any]] = {}
     with output_folder(options.common.out) as out:
-        spawn = multiprocessing.get_context("spawn")
-        with ProcessPoolExecutor(options.workers, spawn, max_tasks_per_child=1) as pool:
-            done = pool.map(carry_out, [options] * len(wanted), wanted)
-            for each, result in zip(wanted, done, strict=True):
-                results[each] = result
-                console.print(f"{each.name}, {each.way}, {each.seed}: {result['verdict']}")
-        rows = compared(results)
-        write_json(Path(out) / "study.json", {"rows": [vars(row) for row in rows]})
-    console.print(outcome_table(results))
-    console.print(comparison_table(rows))
+        done = run_campaign(
+            list(wanted.values()),
+            out,
+            workers=options.workers,
+            about={"command": "contact_study"},
+            console=console,
+            report=False,
+        )
+        ended = {row.key: row for row in done}
+        rows = {run: ended[trial.key] for run, trial in wanted.items()}
+        found = compared(rows)
+        write_json(out / "study.json", {"rows": [finite(vars(row)) for row in found]})
+    console.print(outcome_table(rows))
+    console.print(comparison_table(found))
     return 0
 
 
-def compared(results: dict[StudyRun, dict[str, Any]]) -> list[Compared]:
+def compared(rows: Mapping[StudyRun, Row]) -> list[Compared]:
     """Return every quantity of every assembly and experiment."""
-    rows = []
+    found = []
     for name in (*ASSEMBLIES, *RIG):
-        values = rig_values if name in RIG else assembly_values
-        ways = {
-            way: [values(r) for each, r in results.items() if (each.name, each.way) == (name, way)]
-            for way in WAYS
-        }
-        rows += compare(name, ways)
-    return rows
+        for where in dict.fromkeys(run.where for run in rows if run.name == name):
+            ways = {
+                way: [
+                    values_of(run, row)
+                    for run, row in rows.items()
+                    if (run.name, run.where, run.way) == (name, where, way)
+                ]
+                for way in WAYS
+            }
+            found += compare(name, ways)
+    return found
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

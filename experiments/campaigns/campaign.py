@@ -66,7 +66,7 @@ def run_campaign(
     console = console or Console(quiet=True)
     out = Path(out).absolute()
     (out / TRIALS).mkdir(parents=True, exist_ok=True)
-    rows = _kept(trials, out, console)
+    rows = kept(trials, out, console)
     waiting = [trial for trial in trials if trial.key not in rows or not rows[trial.key].done]
     if len(waiting) < len(trials):
         text = f"{len(trials) - len(waiting)} of {len(trials)} trials are done already."
@@ -90,7 +90,7 @@ def run_campaign(
     return folder.rows
 
 
-def _kept(trials: Sequence[Trial], out: Path, console: Console) -> dict[str, Row]:
+def kept(trials: Sequence[Trial], out: Path, console: Console) -> dict[str, Row]:
     """Return the rows of the trials that have ended before, by key."""
     rows = {}
     for trial in trials:
@@ -165,7 +165,12 @@ class _Folder:
         return summary
 
     def write(self) -> None:
-        """Write index, summary and, if wanted, report."""
+        """Write index, summary and, if wanted, report.
+
+        A worker may have ended a trial without a chance to tell, as the campaign was interrupted.
+        """
+        missing = [trial for trial in self.trials if trial.key not in self.by_key]
+        self.by_key |= kept(missing, self.out, Console(quiet=True))
         write_index(self.out, self.rows)
         summary = self.summarize(running=False)
         if self.report:

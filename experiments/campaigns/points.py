@@ -7,7 +7,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import yaml
-from scipy.stats import qmc
 
 from cell.configuration.config import CellConfig
 from cell.configuration.sections import entries
@@ -56,6 +55,8 @@ def sample(
             if number > 0
             else f"--samples must be at least 1, not {number}."
         )
+    from scipy.stats import qmc  # Half a second that workers can do without.
+
     engine = qmc.Sobol if design == "sobol" else qmc.LatinHypercube
     unit = engine(len(ranges), rng=seed).random(number)
     lows, highs = zip(*ranges.values(), strict=True)

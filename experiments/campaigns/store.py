@@ -9,9 +9,6 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-import pyarrow as pa
-import pyarrow.parquet as parquet
-
 from cell.errors import InputError
 from experiments.campaigns.trial import Row
 from experiments.reporting.output import whole_file, write_json
@@ -97,6 +94,9 @@ def _names(mappings: Iterable[Any]) -> list[str]:
 
 def write_index(out: Path, rows: Sequence[Row]) -> None:
     """Write one row per trial as ``trials.parquet``."""
+    import pyarrow as pa  # Workers can do without.
+    import pyarrow.parquet as parquet
+
     measured = set(_names(row.measured for row in rows))
     columns = {
         name: pa.array(values, pa.float64() if name in measured else None)
