@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from cell.products.loading import load_product
 from experiments.assembly.prepare import RunningCell
-from experiments.assembly.run import Run, StepResult
+from experiments.assembly.run import Run, StepResult, final_state
 from experiments.campaigns.trial import Outcome, Task
 from experiments.reporting.output import write_arrays
 from planning.assembly_plan.explain import stop_text
@@ -15,7 +15,10 @@ from planning.operations.sequence import steps
 
 
 def assemble(task: Task, *, order: str = "", last: str = "") -> Outcome:
-    """Plan and assemble a product; a run that stops early leaves ``failed_state.npz``.
+    """Plan and assemble a product.
+
+    A run that fails leaves a state to go on from, as `soft-jig assemble` does: ``failed_state.npz``
+    if a phase failed, ``state.npz`` if something was measured outside of its limit.
 
     Args:
         task: Product, configuration, seed.
@@ -36,6 +39,8 @@ def assemble(task: Task, *, order: str = "", last: str = "") -> Outcome:
     run.run(todo)
     if run.failure is not None:
         write_arrays(task.file("failed_state.npz"), run.failure.state)
+    elif run.verdict != "success":
+        write_arrays(task.file("state.npz"), final_state(run))
     return outcome_of(run)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import shorten
 
 from rich.console import Console
 from rich.markup import escape
@@ -15,6 +16,7 @@ from experiments.campaigns.summary import failures_by_phase, rate_of, verdict_of
 from experiments.campaigns.trial import VERDICTS, Row, Trial
 from experiments.reporting.provenance import finite, versions
 
+WIDTH = 120  # Of evidence on the terminal; files and report have all of it.
 EXIT_CODES = {"success": 0, "failure": 1, "error": 3}
 
 
@@ -75,5 +77,6 @@ def failure_table(rows: Sequence[Row]) -> Table:
         "phase", "trials", "evidence of the first", title="Failures", title_justify="left"
     )
     for phase in failures_by_phase(rows):
-        table.add_row(escape(phase["phase"]), str(phase["trials"]), escape(phase["evidence"]))
+        evidence = shorten(phase["evidence"], WIDTH, placeholder=" ...")
+        table.add_row(escape(phase["phase"]), str(phase["trials"]), escape(evidence))
     return table

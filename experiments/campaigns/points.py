@@ -142,10 +142,9 @@ def _trial(
     for name, value in own.items():
         options[name] = _as_declared(experiment, name, value)
     product = str(point.get("product", product))
-    known = [entry.path for entry in entries(config)]
-    for path in settings:
-        if path not in known:
-            raise UnknownName("setting or option", path, [*known, *options, "product"])
+    for name in settings:
+        if "." not in name:  # A path is looked up in the configuration, which knows its sections.
+            raise UnknownName(f"option of '{experiment.label}'", name, [*options, "product"])
     config = config.with_changes(settings)
     values = {entry.path: entry.value for entry in entries(config)} | options
     varied = {name: values.get(name, product) for name in point}

@@ -17,7 +17,7 @@ from experiments.reporting.output import write_text
 from experiments.reporting.plots import DPI, SIZE, figure_png
 from experiments.reporting.statistics import wilson
 
-FACTS = ("experiment", "product", "trials", *VERDICTS, "success_rate", "success_interval")
+FACTS = ("experiment", "product", "trials", *VERDICTS, "success_rate")
 MOST_POINTS = 200  # Rows of a table that a person reads; all are in the index.
 BINS = 5  # Of a parameter with more values than `MOST_VALUES`, with as many trials in each.
 MOST_VALUES = 12
@@ -33,6 +33,7 @@ def write_campaign_report(out: Path, rows: Sequence[Row], summary: Mapping[str, 
         summary: Of them.
     """
     facts = {name: summary[name] for name in FACTS if summary.get(name) not in (None, 0)}
+    facts |= {"95 % interval": _interval(summary["success_interval"])}
     quantities = [{"quantity": name} | value for name, value in summary["measured"].items()]
     setup = {k: summary[k] for k in ("command", "executor", "seeds", "code") if k in summary}
     config = escape(json.dumps(summary.get("config", {}), indent=2, default=str))
@@ -75,14 +76,18 @@ def _points(points: Sequence[Mapping[str, Any]]) -> str:
     if len(points) < 2:
         return ""
     rows = [
-        {name: _text(value) for name, value in point["parameters"].items()}
+        {name: _text(value) for name, value in point["parameters"].items() if value is not None}
         | {name: point[name] for name in ("trials", "successes", "success_rate")}
-        | {"95 % interval": point["success_interval"]}
+        | {"95 % interval": _interval(point["success_interval"])}
         for point in points[:MOST_POINTS]
     ]
     rest = len(points) - len(rows)
     more = f"<p>{rest} more are in trials.parquet.</p>" if rest else ""
     return table(rows, list(dict.fromkeys(name for row in rows for name in row))) + more
+
+
+def _interval(ends: Sequence[float] | None) -> str:
+    return "" if ends is None else f"{ends[0]:.2f} to {ends[1]:.2f}"
 
 
 def _text(value: Any) -> Any:

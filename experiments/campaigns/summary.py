@@ -12,6 +12,7 @@ from experiments.campaigns.trial import VERDICTS, Row
 from experiments.reporting.statistics import wilson
 
 LONGEST_LIST = 20  # Keys of trials named per phase.
+STATE = "state.npz"  # Names of saved states end so.
 
 
 def summary_of(rows: Sequence[Row], trials: int, running: bool) -> dict[str, Any]:
@@ -75,7 +76,7 @@ def failures_by_phase(rows: Sequence[Row]) -> list[dict[str, Any]]:
             "trials": len(found),
             "evidence": found[0].evidence,
             "keys": [row.key for row in found[:LONGEST_LIST]],
-            "states": [f for row in found[:LONGEST_LIST] for f in row.files if f.endswith(".npz")],
+            "states": [f for row in found[:LONGEST_LIST] for f in row.files if f.endswith(STATE)],
         }
         for phase, found in sorted(phases.items(), key=lambda item: -len(item[1]))
     ]

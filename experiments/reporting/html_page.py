@@ -75,5 +75,5 @@ def cell(value: Any) -> str:
 
 
 def words(name: str) -> str:
-    """Return the name of a quantity as words."""
-    return name.replace("_", " ")
+    """Return the name of a quantity as words; the path of a setting stays as it is."""
+    return name if "." in name else name.replace("_", " ")
