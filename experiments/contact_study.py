@@ -26,7 +26,8 @@ from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from experiments.cli.assemble import Assemble
-from experiments.cli.common import BadUsage, Common, exit_code
+from experiments.cli.common import BadUsage, Common
+from experiments.cli.ending import exit_code
 from experiments.cli.paper import Place, Push
 from experiments.reporting.output import output_folder, write_json
 

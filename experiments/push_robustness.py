@@ -34,7 +34,8 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 from cell.configuration.config import CellConfig
 from cell.configuration.sections import entries
 from cell.products.loading import load_product
-from experiments.cli.common import BadUsage, Common, exit_code
+from experiments.cli.common import BadUsage, Common
+from experiments.cli.ending import exit_code
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import run_cases
 from experiments.paper.place_push import cases_of

@@ -23,7 +23,8 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.products.loading import load_product
 from experiments.cli.assemble import Assemble
-from experiments.cli.common import BadUsage, exit_code
+from experiments.cli.common import BadUsage
+from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder, write_json
 from planning.operations.limits import Limit
 from planning.operations.registry import OPERATIONS
