@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 import pytest
-
 from faults import SHORT_RUN, Process, result_in
 
 OWN_FILES = {"log.npz", "report.html", "result.json", "state.npz"}

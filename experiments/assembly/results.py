@@ -78,7 +78,8 @@ class Keeper:
         self.result.__exit__(kind, error, traceback)
         if error is not None:
             with suppress(CellError):
-                write_arrays(self.job.out / LOG, self.run.simulation.log.arrays())
+                log = self.run.simulation.log.arrays()
+                write_arrays(self.job.out / LOG, log, compressed=False)
 
     def phase(self, name: str) -> None:
         """Take note of a phase that is about to start."""
