@@ -63,7 +63,7 @@ class Keeper:
         self._phase = ""
 
     def __enter__(self) -> Keeper:
-        self.result.__enter__()
+        # The larger file first: if the disk is full, the former result stays.
         self._keep()
         return self
 
