@@ -160,10 +160,10 @@ def test_full_disk_leaves_the_former_results(whole: Path, tmp_path: Path) -> Non
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
-    """Return the mount point of a disk of 48 kB, if this user may mount one."""
+    """Return the mount point of a disk of 64 kB, if this user may mount one."""
     point = tmp_path / "disk"
     point.mkdir()
-    options = ["-t", "tmpfs", "-o", "size=48k", "tmpfs"]
+    options = ["-t", "tmpfs", "-o", "size=64k", "tmpfs"]
     mount = shutil.which("mount")
     if mount is None or os.geteuid() != 0 or subprocess.call([mount, *options, str(point)]) != 0:
         pytest.skip("no disk can be mounted here")
@@ -171,13 +171,17 @@ def disk(tmp_path: Path) -> Iterator[Path]:
     subprocess.check_call(["umount", str(point)])
 
 
-def test_disk_that_fills_up_ends_the_run_in_one_line(disk: Path) -> None:
-    """The result fits, the state does not: what was done so far can be read."""
+def test_disk_that_fills_up_ends_a_run_that_goes_on_elsewhere(
+    disk: Path, whole: Path, tmp_path: Path
+) -> None:
+    """The first state fits, but no second one beside it."""
     code, stderr = start(disk).end()
     assert code == 3
     one_line(stderr, "state.npz", "No space left")
     assert result_in(disk)["verdict"] == "error"
-    assert {path.name for path in disk.iterdir()} == {"result.json"}
+    out = tmp_path / "elsewhere"
+    assert start(out, "--start", str(disk / "state.npz")).end() == (0, "")
+    assert_same_end(out, whole)
 
 
 def test_read_only_disk_is_the_machines_fault(disk: Path) -> None:
