@@ -1,13 +1,14 @@
 """The errors this project raises on purpose: one line names the culprit and the alternatives.
 
-Two kinds, told apart by what a caller does about them: `InputError`, something that was given
+Three kinds, told apart by what a caller does about them: `InputError`, something that was given
 cannot be used and nothing was run (the command line's exit code 2); `RunFailure`, it ran and
-failed (exit code 1).
+failed (exit code 1); `MachineError`, the machine did not let it run (exit code 3).
 """
 
 from __future__ import annotations
 
 import difflib
+import re
 from collections.abc import Iterable
 
 
@@ -21,6 +22,10 @@ class InputError(CellError):
 
 class RunFailure(CellError):
     """What was asked for was tried and failed: a verdict, with its evidence."""
+
+
+class MachineError(CellError):
+    """What the machine refused: a full disk, a folder that is read-only, no memory left."""
 
 
 class UnknownName(InputError):
@@ -48,3 +53,19 @@ class BadPart(InputError):
 
 class BadOrder(InputError):
     """An assembly order that does not list every part once."""
+
+
+SHORT = 200  # Characters of a line that a person reads at a glance [A].
+WORD = 60  # Characters without a space of which only the ends are shown in a long line [A].
+
+
+def one_short_line(text: str) -> str:
+    """Return a message as one line of at most `SHORT` characters, safe on any terminal.
+
+    Of a longer one, long words lose their middle, and what is left loses its end. Line breaks,
+    control characters and what cannot be encoded are written as escapes.
+    """
+    shown = "".join(c if c.isprintable() else c.encode("unicode_escape").decode() for c in text)
+    if len(shown) > SHORT:
+        shown = re.sub(rf"\S{{{WORD},}}", lambda word: f"{word[0][:32]}...{word[0][-16:]}", shown)
+    return shown if len(shown) <= SHORT else f"{shown[: SHORT - 3].rstrip()}..."

@@ -25,7 +25,8 @@ from cell.configuration.config import CellConfig
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Row, Trial
-from experiments.cli.common import BadUsage, Common, exit_code
+from experiments.cli.common import BadUsage, Common
+from experiments.cli.ending import exit_code
 from experiments.paper.cases import cases_of
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import finite

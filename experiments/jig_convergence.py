@@ -27,7 +27,7 @@ from cell.errors import RunFailure
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Outcome, Row, Task
-from experiments.cli.common import exit_code
+from experiments.cli.ending import exit_code
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS
 from experiments.jig.specimens import Prism, ProductPart, Specimen

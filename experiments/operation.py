@@ -13,8 +13,8 @@ from typing import Annotated
 import tyro
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, Positional, arg
 
-from cell.errors import InputError
 from experiments.cli.assemble import Assemble
+from experiments.cli.ending import exit_code
 from planning.operations.registry import operation_named
 
 
@@ -33,11 +33,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = tyro.cli(
         OperationOptions, args=arguments, description=__doc__, config=(FlagCreatePairsOff,)
     )
-    try:
+
+    def run() -> int:
         return wanted.assemble.run_as(wanted.operation, operation_named(wanted.operation))
-    except InputError as error:
-        print(f"{wanted.operation}: {error}", file=sys.stderr)
-        return 2
+
+    return exit_code(wanted.operation, run)
 
 
 if __name__ == "__main__":

@@ -35,7 +35,8 @@ from cell.errors import RunFailure
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Row
-from experiments.cli.common import BadUsage, Common, exit_code
+from experiments.cli.common import BadUsage, Common
+from experiments.cli.ending import exit_code
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import cases_of
 from experiments.reporting.output import output_folder, write_json

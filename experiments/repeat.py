@@ -24,7 +24,8 @@ from experiments.campaigns.command import run_sweep
 from experiments.campaigns.points import trials
 from experiments.campaigns.store import read_trial, trial_file
 from experiments.campaigns.trial import Row
-from experiments.cli.common import BadUsage, Common, exit_code, split_order
+from experiments.cli.common import BadUsage, Common, split_order
+from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder
 from planning.assembly_plan.planner import plan
 from planning.operations.limits import Limit

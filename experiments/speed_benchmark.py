@@ -38,7 +38,8 @@ from cell.errors import InputError
 from cell.products.loading import load_product
 from cell.products.product import Product
 from experiments.assembly.prepare import RunningCell
-from experiments.cli.common import BadUsage, Common, exit_code
+from experiments.cli.common import BadUsage, Common
+from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder, whole_file, write_json
 from experiments.reporting.provenance import finite, versions
 from experiments.speed.calibration import Kernel

@@ -22,11 +22,11 @@ from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, read_state, restore_state, save_state
 from cell.workpieces.parts import LoosePart
 from experiments import shaft_insertion
-from experiments.assembly import run as run_module
 from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
 from experiments.assembly.prepare import Disturbance, RunningCell
-from experiments.assembly.run import Run, go_on
+from experiments.assembly.resume import go_on, resumable_state
+from experiments.assembly.run import Run, StepResult
 from planning.assembly_plan.planner import plan
 from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import INSERT_SHAFT
@@ -171,12 +171,16 @@ def test_run_that_goes_on_remembers_what_the_planner_knew(run: Run) -> None:
     todo = steps(PRODUCT, plan(PRODUCT, ("plate", "bolts", "motor")))
     station = run.station
     station.look()
-    run.done = tuple(step.name for step in todo[:4])
+    run.steps = [
+        StepResult(step.name, step.operation.name, "success", 1.0, 2.0, {"depth_m": 0.1}, ())
+        for step in todo[:4]
+    ]
     station.fixed, station.driven = ("motor",), ("bolt_1",)
     station.origins["plate"] = origin = station.pose_of("plate")
     station.placements["motor"] = Placement(0.3, origin, np.arange(6.0))
     again = Run(RunningCell(PRODUCT, CONFIG, seed=0))
-    left = go_on(again, todo, run_module.final_state(run))
+    left = go_on(again, todo, resumable_state(run))
+    assert again.steps == run.steps
     assert [step.operation.name for step in left] == ["insert_shaft", "tighten_bolts"]
     assert (again.station.fixed, again.station.driven) == (("motor",), ("bolt_1",))
     assert again.station.held is None
@@ -365,5 +369,5 @@ def test_search_finds_a_shaft_that_is_not_where_the_sensor_says(
     monkeypatch.setattr(insert_phases, "goal_pose", misplaced)
     arguments = ["--start", str(placed / "state.npz"), "--quiet", "--out", str(tmp_path)]
     assert shaft_insertion.main(arguments) == 0
-    measured = result_in(tmp_path)["steps"][0]["measured"]
+    measured = result_in(tmp_path)["steps"][-1]["measured"]
     assert measured["searched"] == 1.0

@@ -7,7 +7,7 @@ from types import ModuleType
 
 import pytest
 
-from cell.errors import BadOrder, CellError
+from cell.errors import BadOrder
 from cell.products.read_options import ReadOptions
 from experiments.cli.main import main, one_line, parse
 from experiments.plan.options import PlanOptions
@@ -198,14 +198,20 @@ def test_complaint_of_another_shape_keeps_its_text() -> None:
     assert one_line("plain text\nin two lines.") == "plain text in two lines. See soft-jig --help."
 
 
-def test_errors_that_are_not_ours_are_not_hidden(
-    calls: list[dict], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+def test_error_that_is_not_ours_is_one_line_with_its_traceback_in_a_file(
+    calls: list[dict],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture,
 ) -> None:
-    """A bug shows its traceback; only a `CellError` becomes exit 2."""
+    monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
     monkeypatch.setattr("cell.configuration.config.CellConfig.load", lambda *_: 1 / 0)
-    with pytest.raises(ZeroDivisionError):
-        main(["plan", "x", "--out", str(tmp_path)])
-    assert issubclass(BadOrder, CellError)
+    assert main(["plan", "x", "--out", str(tmp_path / "out")]) == 3
+    line = capsys.readouterr().err
+    assert line.count("\n") == 1 and "ZeroDivisionError: division by zero" in line
+    (file,) = tmp_path.glob("soft-jig-*.txt")
+    assert file.name in line
+    assert "Traceback" in file.read_text()
 
 
 def test_module_runs_like_the_console_script() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -42,6 +42,9 @@ class Log:
         columns["phase_start"] = np.array([start for _, start in self.phases])
         return columns
 
-    def save(self, path: Path) -> None:
-        """Write all columns as a compressed npz."""
-        np.savez_compressed(path, allow_pickle=False, **self.arrays())
+    def restore(self, arrays: Mapping[str, np.ndarray]) -> None:
+        """Go on from what `arrays` returned."""
+        columns = dict(arrays)
+        starts = columns.pop("phase_start").tolist()
+        self.phases = list(zip(columns.pop("phase_name").tolist(), starts, strict=True))
+        self._rows = {name: list(rows) for name, rows in columns.items()}

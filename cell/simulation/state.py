@@ -17,6 +17,7 @@ import numpy as np
 
 from cell.errors import InputError
 from cell.simulation.simulation import Simulation
+from cell.whole_file import whole_file
 
 State = dict[str, np.ndarray]
 
@@ -171,8 +172,8 @@ def _nested(flat: Mapping[str, np.ndarray]) -> dict[str, Any]:
 
 
 def write_state(path: Path, state: State) -> None:
-    """Write a saved state to a compressed npz."""
-    with path.open("wb") as file:  # Given a path, NumPy would add an ending.
+    """Write a saved state to a compressed npz, whole or not at all."""
+    with whole_file(path) as temporary, temporary.open("wb") as file:
         np.savez_compressed(file, allow_pickle=False, **state)
 
 

@@ -10,8 +10,9 @@ from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.progress import Progress, result_table
 from experiments.assembly.replay import Replay
-from experiments.assembly.results import write_infeasible, write_results
-from experiments.assembly.run import Run, go_on, read_final_state
+from experiments.assembly.results import Keeper, write_infeasible
+from experiments.assembly.resume import go_on, read_resumable
+from experiments.assembly.run import Run
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.operations.operation import NoOperation, Step
@@ -36,7 +37,7 @@ def run_job(job: Job) -> int:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
         return 1
-    start = None if job.start is None else read_final_state(job.start)
+    start = None if job.start is None else read_resumable(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:
         console.print(f"Watch at {replay.url}", soft_wrap=True)
@@ -44,11 +45,13 @@ def run_job(job: Job) -> int:
     if start is not None:
         todo = go_on(run, todo, start)
     pictures = Pictures(run.running)
-    with Progress(console, [step.name for step in todo]) as progress:
-        run.watchers = (progress, pictures)
-        run.run(todo)
-    write_results(job, fixing, run, pictures)
-    replay.save()
+    progress = Progress(console, [step.name for step in todo])
+    with Keeper(job, fixing, run) as keeper:
+        with progress:
+            run.watchers = (keeper, progress, pictures)
+            run.run(todo)
+        replay.save()
+        keeper.finish(pictures)
     console.print(result_table(run.steps))
     if run.failure is not None:
         text = f"Failed in '{run.failure.phase}': {run.failure.evidence}"

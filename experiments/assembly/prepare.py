@@ -9,13 +9,16 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell.builder import add_cell
 from cell.configuration.config import CellConfig
+from cell.errors import InputError
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
-from cell.simulation.state import hand_over
+from cell.simulation.state import State, hand_over, restore_state, save_state
 from experiments.assembly.replay import Replay
 from planning.operations.operation import Operation
 from planning.operations.station import Station
 from planning.perception.belief import TruthSource
+
+TIME_STEP = "time_step"  # In a saved state: of the simulation that it was taken of.
 
 
 @dataclass(frozen=True)
@@ -91,6 +94,24 @@ class RunningCell:
         """Let the present simulation be that at the time step of an operation, as it was left."""
         steps = self.config.simulation
         self._switch(steps.coarse_time_step if operation.coarse else steps.time_step)
+
+    def resume(self, state: State) -> None:
+        """Go on where a saved state was taken, at the time step of the simulation at that time.
+
+        Raises:
+            InputError: It is of another cell.
+        """
+        steps, time_step = self.config.simulation, float(state[TIME_STEP])
+        if time_step not in (steps.time_step, steps.coarse_time_step):
+            raise InputError(f"The saved state is of another time step: {time_step:g} s.")
+        self._switch(time_step)
+        restore_state(self.simulation, state)
+        self.station.restore(state)
+
+    def save(self) -> State:
+        """Return the state of the simulation and all that the planner remembers, for `resume`."""
+        time_step = np.array(self.simulation.time_step)
+        return {**save_state(self.simulation), **self.station.save(), TIME_STEP: time_step}
 
     def go_on(self, operation: Operation | None = None) -> None:
         """Go on at the time step of an operation; with none given, at the configured one."""

@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import asdict
+from types import TracebackType
 from typing import Any
 
+from cell.errors import CellError
 from cell.simulation.state import State
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
-from experiments.assembly.run import Run, StepResult, final_state
+from experiments.assembly.resume import failed_state, resumable_state
+from experiments.assembly.run import Run, StepResult
 from experiments.assembly.timeline import fixture_bars
 from experiments.reporting.gantt import plot_bars
 from experiments.reporting.html_page import Picture
@@ -16,12 +20,14 @@ from experiments.reporting.output import write_arrays, write_json
 from experiments.reporting.plots import draw, plot_force_plate
 from experiments.reporting.provenance import finite, versions
 from experiments.reporting.report import write_report
+from experiments.reporting.result_file import RESULT, ResultFile
 from planning.assembly_plan.plan_file import plan_to_dict
 from planning.assembly_plan.planner import FixingPlan
 from planning.operations.operation import Arrays
 from planning.operations.phase_class import PhaseClass
 
-FILES = ("result.json", "log.npz", "report.html", "state.npz", "failed_state.npz")
+STATE, FAILED_STATE, LOG, REPORT = "state.npz", "failed_state.npz", "log.npz", "report.html"
+FILES = (RESULT, LOG, REPORT, STATE, FAILED_STATE)
 
 REPEATED = "carried out again with fine time steps, as the solver failed at a coarse one."
 ASLEEP = "A part that rests while nothing touches it sleeps: the force plate does not feel it then."
@@ -29,77 +35,128 @@ ASLEEP = "A part that rests while nothing touches it sleeps: the force plate doe
 
 def write_infeasible(job: Job, fixing: FixingPlan, reason: str) -> None:
     """Write the result of an order that cannot be carried out."""
-    _remove_former(job)
-    result = _summary(job, fixing, "failure") | {
+    result = _summary(job, fixing) | {
+        "verdict": "failure",
         "steps": [],
         "failure": {"phase": "plan", "evidence": reason},
     }
-    write_json(job.out / "result.json", result)
+    write_json(job.out / RESULT, result)
+    _remove_former(job, RESULT)
 
 
-def write_results(job: Job, fixing: FixingPlan, run: Run, pictures: Pictures) -> None:
-    """Write everything that a run leaves behind."""
-    _remove_former(job)
-    result = _result(job, fixing, run)
-    log = run.simulation.log.arrays()
-    write_arrays(job.out / "log.npz", log)
-    if run.failure is None:
-        _write_state(job, "state.npz", final_state(run))
-    else:
-        _write_state(job, "failed_state.npz", run.failure.state)
-    write_report(
-        job.out / "report.html",
-        title=f"{job.product.name}: {job.command}",
-        plan=plan_to_dict(fixing),
-        result=result,
-        pictures=pictures.taken,
-        timeline=_timeline(run, log),
-        plots=_plots(run, log),
-        notes=_notes(run, pictures),
-    )
-    # Last: whoever finds it finds the rest, too.
-    write_json(job.out / "result.json", result)
+class Keeper:
+    """Keeps what a run has done, while it goes on: a watcher, and a context around the run.
+
+    After every step the state is written and then the result, which names the state. What ends the
+    run early finds both there, and the log is written, too.
+
+    Args:
+        job: What was asked for.
+        fixing: Its plan.
+        run: Where it begins.
+    """
+
+    def __init__(self, job: Job, fixing: FixingPlan, run: Run) -> None:
+        self.job, self.fixing, self.run = job, fixing, run
+        self.result = ResultFile(job.out, _summary(job, fixing))
+        self.state: State = {}
+        self._phase = ""
+
+    def __enter__(self) -> Keeper:
+        # The larger file first: if the disk is full, the former result stays.
+        self._keep()
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        traceback: TracebackType | None,
+    ) -> None:
+        if error is not None:
+            self.result.content["phase"] = self._phase
+        self.result.__exit__(kind, error, traceback)
+        if error is not None:
+            with suppress(CellError):
+                log = self.run.simulation.log.arrays()
+                write_arrays(self.job.out / LOG, log, compressed=False)
+
+    def phase(self, name: str) -> None:
+        """Take note of a phase that is about to start."""
+        self._phase = name
+
+    def step(self, step: StepResult) -> None:
+        """Write state and result after a step."""
+        if self.run.failure is None:
+            self._keep()
+
+    def _keep(self) -> None:
+        self.state = resumable_state(self.run)
+        write_arrays(self.job.out / STATE, self.state)
+        self.result.update(state=STATE, **_course(self.run))
+
+    def finish(self, pictures: Pictures) -> None:
+        """Write everything that a run leaves behind; remove what an earlier one has left."""
+        job, run = self.job, self.run
+        log = run.simulation.log.arrays()
+        if run.failure is None:
+            name, state = STATE, resumable_state(run)
+        else:
+            name, state = FAILED_STATE, failed_state(self.state, run)
+        write_arrays(job.out / LOG, log)
+        write_arrays(job.out / name, state)
+        result = self.result.content | _course(run) | {"state": name, "verdict": run.verdict}
+        write_report(
+            job.out / REPORT,
+            title=f"{job.product.name}: {job.command}",
+            plan=plan_to_dict(self.fixing),
+            result=result,
+            pictures=pictures.taken,
+            timeline=_timeline(run, log),
+            plots=_plots(run, log),
+            notes=_notes(run, pictures),
+        )
+        # Last: whoever finds a verdict finds the rest, too.
+        self.result.update(**result)
+        _remove_former(job, RESULT, LOG, name, REPORT)
 
 
-def _remove_former(job: Job) -> None:
-    """An earlier run's files must not be taken for this one's."""
+def _remove_former(job: Job, *own: str) -> None:
+    """Remove the files of an earlier run that this one has not replaced."""
     for name in FILES:
-        (job.out / name).unlink(missing_ok=True)
+        if name not in own:
+            (job.out / name).unlink(missing_ok=True)
 
 
-def _write_state(job: Job, name: str, state: State) -> None:
-    write_arrays(job.out / name, state)
-
-
-def _summary(job: Job, fixing: FixingPlan, verdict: str) -> dict[str, Any]:
+def _summary(job: Job, fixing: FixingPlan) -> dict[str, Any]:
+    start = {} if job.start is None else {"start": job.start}
     return {
         "command": job.command,
         "product": job.product.name,
         "order": list(fixing.order),
         "seed": job.seed,
-        "verdict": verdict,
+        "verdict": "running",
         "config": finite(job.config.to_dict()),
         "versions": versions(),
+        **start,
     }
 
 
-def _result(job: Job, fixing: FixingPlan, run: Run) -> dict[str, Any]:
+def _course(run: Run) -> dict[str, Any]:
+    """Return what ``result.json`` says of the course of a run so far."""
     simulation = run.simulation
-    began = run.records[0].start.time if run.records else 0.0
-    result = _summary(job, fixing, run.verdict) | {
+    seconds = simulation.time - run.began
+    course = {
         "steps": [_step(step) for step in run.steps],
-        "real_time_factor": (simulation.time - began) / max(simulation.stepping_cpu, 1e-9),
-        "sim_seconds": simulation.time - began,
+        "real_time_factor": seconds / max(simulation.stepping_cpu, 1e-9),
+        "sim_seconds": seconds,
         "disturbance": asdict(run.running.disturbance),
         "contact_links": simulation.cell.links.summary(simulation.root),
     }
     if run.failure is not None:
-        result["failure"] = {
-            "phase": run.failure.phase,
-            "evidence": run.failure.evidence,
-            "state": "failed_state.npz",
-        }
-    return result
+        failure = {"phase": run.failure.phase, "evidence": run.failure.evidence}
+        course["failure"] = failure | {"state": FAILED_STATE}
+    return course
 
 
 def _step(step: StepResult) -> dict[str, Any]:

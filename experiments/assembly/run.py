@@ -5,24 +5,19 @@ from __future__ import annotations
 import time
 from collections.abc import Generator, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Protocol
 
-import numpy as np
-
-from cell.errors import InputError, RunFailure
+from cell.errors import RunFailure
 from cell.simulation.phase import Outcome, Phase, PhaseFailed, SolverFailed
 from cell.simulation.simulation import Simulation
-from cell.simulation.state import State, read_state, restore_state, save_state
+from cell.simulation.state import State
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.timeline import Timeline
 from planning.operations.limits import FailedCheck
 from planning.operations.measures import measure
 from planning.operations.operation import PhaseRecord, Role, Step, StepRecord
-from planning.operations.snapshot import take_snapshot
+from planning.operations.snapshot import Snapshot, take_snapshot
 from planning.operations.station import Station
-
-DONE = "operations_done"  # In a saved state: names of the steps before it.
 
 
 @dataclass(frozen=True)
@@ -82,10 +77,11 @@ class Run:
     Attributes:
         running: The cell.
         watchers: Told of each phase before it starts and of each step when it is done.
-        records: What was recorded of each step, in the same order as ``steps``.
-        steps: Results so far.
+        records: What was recorded of each step of this run.
+        steps: Results so far, first those of an earlier run that this one goes on from.
         failure: Why it stopped, if it did.
-        done: Names of the steps before this run.
+        placed: The truth when the part on the fixture was put there, if that was in an earlier run.
+        began: Simulated time at the start of the first step [s].
         timeline: What each arm did in every phase that has ended.
     """
 
@@ -94,7 +90,8 @@ class Run:
     records: list[StepRecord] = field(default_factory=list)
     steps: list[StepResult] = field(default_factory=list)
     failure: Failure | None = None
-    done: tuple[str, ...] = ()
+    placed: Snapshot | None = None
+    began: float = 0.0
     timeline: Timeline = field(init=False)
     _phase: str = ""
     _start: State = field(default_factory=dict)
@@ -125,6 +122,8 @@ class Run:
         it is worth knowing.
         """
         for step in steps:
+            if not self.steps:
+                self.began = self.simulation.time
             result = self._step(step)
             self.steps.append(result)
             for watcher in self.watchers:
@@ -133,17 +132,29 @@ class Run:
                 return
         self.running.go_on()
 
+    def latest_placed(self) -> Snapshot | None:
+        """Return the truth when the latest part had been put on the fixture.
+
+        If that was before the first step there is: when the first step began.
+        """
+        for record in reversed(self.records):
+            if record.step.operation.role is Role.FIX and record.end is not None:
+                return record.end
+        if self.placed is None and self.records:
+            return self.records[0].start
+        return self.placed
+
     def _step(self, step: Step) -> StepResult:
         started = time.process_time()
         record = self._record(step)
         self.records.append(record)
         self.running.go_on(step.operation)
-        state, mark, bars = save_run(self), self.simulation.log.mark(), len(self.timeline.bars)
+        state = self.running.save()
+        mark, bars = self.simulation.log.mark(), len(self.timeline.bars)
         self._carry_out(record)
         repeated = self._rejected and self.running.coarse
         if repeated:
-            restore_state(self.simulation, state)
-            self.station.restore(state)
+            self.running.resume(state)
             self.simulation.log.cut(mark)
             del self.timeline.bars[bars:]
             record.phases.clear()
@@ -182,13 +193,7 @@ class Run:
         now, station = take_snapshot(self.simulation), self.station
         record = StepRecord(step, now, origin=station.origins.get(step.parts[0]))
         if station.fixed:
-            record.base, record.placed = station.fixed[0], now
-            for earlier in self.records:
-                # The latest part that was placed, in this run or before it.
-                if earlier.step.operation.role is Role.FIX:
-                    record.placed = earlier.end
-                elif record.placed is now:
-                    record.placed = earlier.start
+            record.base, record.placed = station.fixed[0], self.latest_placed() or now
         return record
 
     def _watched(self, record: StepRecord) -> Generator[Phase, Outcome, None]:
@@ -196,7 +201,7 @@ class Run:
         pending = record.step.phases(self.station)
         outcome: Outcome | None = None
         while True:
-            self._start = save_run(self)
+            self._start = self.running.save()
             self._phase = f"{record.step.name}: plan the next motion"
             try:
                 phase = next(pending) if outcome is None else pending.send(outcome)
@@ -212,49 +217,3 @@ class Run:
             record.phases[phase.subject, phase.kind] = PhaseRecord(
                 start, end, outcome.peak_force, phase.awake
             )
-
-
-def save_run(run: Run) -> State:
-    """Return the state of the simulation and all that the planner remembers."""
-    return {**save_state(run.simulation), **run.station.save()}
-
-
-def go_on(run: Run, steps: Sequence[Step], state: State) -> list[Step]:
-    """Put a fresh run where an earlier one ended; return the steps that are left.
-
-    Args:
-        run: Of the same product, with the same configuration and seed.
-        steps: All steps of the plan.
-        state: As `final_state` returned it.
-
-    Raises:
-        InputError: The state is not that after the first steps.
-    """
-    done = [str(name) for name in state[DONE]]
-    if done != [step.name for step in steps[: len(done)]]:
-        raise InputError(
-            f"The saved state is after {', '.join(done) or 'no operation'}; "
-            f"the plan begins with {', '.join(step.name for step in steps)}."
-        )
-    restore_state(run.simulation, state)
-    run.station.restore(state)
-    run.done = tuple(done)
-    return list(steps[len(done) :])
-
-
-def read_final_state(path: Path) -> State:
-    """Read what `final_state` returned, from a file.
-
-    Raises:
-        InputError: It cannot be read, or is something else.
-    """
-    state = read_state(path)
-    if DONE not in state:
-        raise InputError(f"'{path}' is not the state.npz that a run ends with.")
-    return state
-
-
-def final_state(run: Run) -> State:
-    """Return the state that a run ended in, and the names of the steps that led to it."""
-    names = [*run.done, *(step.name for step in run.steps)]
-    return {**save_run(run), DONE: np.array(names, dtype=str)}

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from cell.products.loading import load_product
 from experiments.assembly.prepare import RunningCell
-from experiments.assembly.run import Run, StepResult, final_state
+from experiments.assembly.resume import failed_state, resumable_state
+from experiments.assembly.run import Run, StepResult
 from experiments.campaigns.trial import Outcome, Task
 from experiments.reporting.output import write_arrays
 from planning.assembly_plan.explain import stop_text
@@ -36,12 +37,29 @@ def assemble(task: Task, *, order: str = "", last: str = "") -> Outcome:
     except NoOperation as reason:
         return Outcome(False, phase="plan", evidence=str(reason))
     run = Run(RunningCell(product, task.config, task.seed))
+    before = _BeforeStep(run)
+    run.watchers = (before,)
     run.run(todo)
     if run.failure is not None:
-        write_arrays(task.file("failed_state.npz"), run.failure.state)
+        write_arrays(task.file("failed_state.npz"), failed_state(before.state, run))
     elif run.verdict != "success":
-        write_arrays(task.file("state.npz"), final_state(run))
+        write_arrays(task.file("state.npz"), resumable_state(run))
     return outcome_of(run)
+
+
+class _BeforeStep:
+    """Keeps the state before the present step of a run, from which it can be run again."""
+
+    def __init__(self, run: Run) -> None:
+        self.run, self.state = run, resumable_state(run)
+
+    def phase(self, name: str) -> None:
+        """Phases do not matter."""
+
+    def step(self, step: StepResult) -> None:
+        """Take the state after a step that was carried through."""
+        if self.run.failure is None:
+            self.state = resumable_state(self.run)
 
 
 def _up_to(todo: list[Step], last: str) -> list[Step]:

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import OmitArgPrefixes, Positional, arg
 
-from experiments.cli.common import Common, split_order
-from experiments.reporting.output import output_folder
+from experiments.cli.common import BadUsage, Common, split_order
+from experiments.reporting.output import output_folder, writable_folder
 
 if TYPE_CHECKING:
     from planning.operations.operation import Operation
@@ -30,7 +30,7 @@ class Assemble:
     """What holds the parts: soft_jig, flat_plate. Default: workcell.fixture."""
 
     start: Annotated[Path | None, arg(metavar="STATE.npz")] = None
-    """Go on from the state.npz of an earlier run with the same product, order and seed."""
+    """Go on from state.npz or failed_state.npz of a run with the same product, order and seed."""
 
     view: bool = False
     """Show the run in a browser while it goes on."""
@@ -52,9 +52,13 @@ class Assemble:
         """
         config = self.common.load_config(self.fixture)
         with contextlib.ExitStack() as folders:
-            out = folders.enter_context(output_folder(self.common.out))
+            from experiments.assembly.results import FILES
+
+            out = folders.enter_context(output_folder(self.common.out, *FILES))
             if self.replay is not None:
-                folders.enter_context(output_folder(self.replay.absolute().parent))
+                folders.enter_context(writable_folder(self.replay.absolute().parent))
+                if self.replay.is_dir() or not self.replay.name:
+                    raise BadUsage(f"--replay {self.replay}: it is a folder, not a file.")
             from cell.products.loading import load_product, require_product_file
             from experiments.assembly.assemble import run_job
             from experiments.assembly.job import Job

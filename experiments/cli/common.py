@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-import sys
-from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 from tyro.conf import UseAppendAction, arg
 
-from cell.errors import CellError, InputError
+from cell.errors import InputError
 
 if TYPE_CHECKING:
     from cell.configuration.config import CellConfig
@@ -59,23 +57,6 @@ class Common:
             config = config.with_changes({"workcell.fixture": fixture})
         fixture_class(config.workcell.fixture)
         return config
-
-
-def exit_code(script: str, run: Callable[[], int]) -> int:
-    """Return what a script's work returns; an error of ours becomes one line and a code.
-
-    Args:
-        script: Its name, before the line.
-        run: Its work.
-
-    Returns:
-        The code of `run`, 2 for bad input, or 1 for a run that failed.
-    """
-    try:
-        return run()
-    except CellError as error:
-        print(f"{script}: {error}", file=sys.stderr)
-        return 2 if isinstance(error, InputError) else 1
 
 
 def split_order(text: str | None) -> tuple[str, ...] | None:

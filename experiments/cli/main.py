@@ -1,7 +1,6 @@
 """The command line: ``soft-jig COMMAND ...``; commands by name, parsing, exit codes.
 
-Exit code 0: done and the verdict is success. 1: it ran and the verdict is failure. 2: bad input,
-with one line on stderr that names the culprit and the alternatives.
+What the exit codes mean is in ``ending.py``.
 """
 
 from __future__ import annotations
@@ -17,9 +16,10 @@ import tyro
 from tyro.conf import FlagCreatePairsOff
 
 import cell
-from cell.errors import InputError, RunFailure, UnknownName
+from cell.errors import UnknownName
 from experiments.cli.assemble import Assemble
 from experiments.cli.common import BadUsage
+from experiments.cli.ending import exit_code
 from experiments.cli.paper import Place, Push, Regress
 from experiments.cli.plan import Plan
 from experiments.cli.sweep import Sweep
@@ -27,6 +27,7 @@ from experiments.cli.sweep import Sweep
 DESCRIPTION = """\
 A digital twin of a dual-arm assembly cell with a soft jig.
 Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on stderr.
+3: an error of the machine or of ours. 130, 143: interrupted; what was done is kept.
 --version prints the versions of the twin and of Drake.
 """
 Command = Plan | Assemble | Place | Push | Regress | Sweep
@@ -90,11 +91,6 @@ def one_line(complaint: str) -> str:
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command line and return the exit code."""
-    try:
-        return parse(sys.argv[1:] if arguments is None else arguments).run()
-    except InputError as error:
-        print(f"soft-jig: {error}", file=sys.stderr)
-        return 2
-    except RunFailure as error:
-        print(f"soft-jig: {error}", file=sys.stderr)
-        return 1
+    return exit_code(
+        "soft-jig", lambda: parse(sys.argv[1:] if arguments is None else arguments).run()
+    )

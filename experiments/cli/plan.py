@@ -81,7 +81,12 @@ class Plan:
         """Write ``plan.json``, ``matrices.npz`` and ``plan.html``; return the exit code."""
         config = self.common.load_config()
         stdout = io.StringIO() if self.common.quiet else sys.stdout
-        with output_folder(self.common.out) as out, contextlib.redirect_stdout(stdout):
+        from experiments.plan.options import MATRICES, PAGE, PLAN
+
+        with (
+            output_folder(self.common.out, PLAN, MATRICES, PAGE) as out,
+            contextlib.redirect_stdout(stdout),
+        ):
             from experiments.plan.command import run_plan
 
             return run_plan(

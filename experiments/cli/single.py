@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import sys
 from collections.abc import Sequence
 
 import tyro
 from tyro.conf import FlagCreatePairsOff
 
-from cell.errors import InputError
 from experiments.cli.assemble import Assemble
+from experiments.cli.ending import exit_code
 from planning.operations.operation import Operation
 
 
@@ -30,8 +29,4 @@ def run_script(
     options = tyro.cli(
         Assemble, args=arguments, description=description, config=(FlagCreatePairsOff,)
     )
-    try:
-        return options.run_as(command, last)
-    except InputError as error:
-        print(f"{command}: {error}", file=sys.stderr)
-        return 2
+    return exit_code(command, lambda: options.run_as(command, last))

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from cell.configuration.config import CellConfig
 from cell.products.product import Grasp, Product
 from cell.simulation.phase import PhaseFailed
+from cell.simulation.state import State
 from experiments.paper.postures import Posture
 from experiments.paper.rest import Rest
 from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
@@ -91,6 +92,15 @@ class RigHand:
     def meter(self) -> Meter:
         """CPU time spent stepping, by class of what goes on."""
         return self.simulation.meter
+
+    def save(self) -> State:
+        """Return time, positions and velocities of all bodies; the trial's seed gives the rest."""
+        plant, context = self.simulation.rig.plant, self.simulation.observer.context
+        return {
+            "time": np.array(self.simulation.time),
+            "q": plant.GetPositions(context),
+            "v": plant.GetVelocities(context),
+        }
 
     def press(self) -> None:
         """Grip the part, press it in and freeze the bag.

@@ -22,6 +22,7 @@ from cell.products.product import Grasp, Product
 from cell.simulation.events import rest_jig, wake_jig
 from cell.simulation.phase import Condition, Outcome, Phase, PhaseFailed, Running, after
 from cell.simulation.simulation import Simulation
+from cell.simulation.state import State, save_state
 from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rest import Rest
@@ -166,6 +167,10 @@ class RobotHand:
         suits = anywhere if bench.push is None else self.leaves_room
         self._placing = _Pending(pick_place(station, self._name, bench.posture.up, suits=suits))
         self.planned = self._planned(0.0)
+
+    def save(self) -> State:
+        """Return the state of the cell and what the planner remembers."""
+        return {**save_state(self.simulation), **self.station.save()}
 
     def press(self) -> None:
         """Fetch the part, press it into the bag and freeze it there."""

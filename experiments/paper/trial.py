@@ -13,6 +13,7 @@ from cell.configuration.config import CellConfig
 from cell.errors import BadPart
 from cell.products.product import Part
 from cell.simulation.phase import PhaseFailed
+from cell.simulation.state import State
 from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer
@@ -97,6 +98,10 @@ class Hand(Protocol):
         """The simulation of the trial."""
         ...
 
+    def save(self) -> State:
+        """Return the state of the trial, to look at."""
+        ...
+
     def press(self) -> None:
         """Press the part into the bag and freeze it; the part stays in the grasp."""
         ...
@@ -143,6 +148,7 @@ class TrialRecord:
         last_jig: X_WJ of the jig at the end of the trial, also after a failure.
         moved: X_JP of the part at the end of the trial.
         failure: The phase that failed and the evidence; None if all phases ran.
+        state: At the end of the trial, also after a failure.
         log: Arrays of the trial.
         sim_seconds, cpu_seconds: Simulated time, and CPU time spent stepping [s].
         meter: The same by class of what goes on.
@@ -157,6 +163,7 @@ class TrialRecord:
     last_jig: RigidTransform = field(default_factory=RigidTransform)
     moved: RigidTransform | None = None
     failure: tuple[str, str] | None = None
+    state: State = field(default_factory=dict)
     log: dict[str, np.ndarray] = field(default_factory=dict)
     sim_seconds: float = 0.0
     cpu_seconds: float = 0.0
@@ -227,7 +234,7 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
         trial.failure = (error.phase, error.evidence)
     watch("end", observer)
     trial.moved, trial.last_jig = observer.X_JP, observer.X_WJ
-    trial.log = observer.log.arrays()
+    trial.state, trial.log = hand.save(), observer.log.arrays()
     clock = hand.simulation
     trial.sim_seconds, trial.cpu_seconds = clock.time, clock.stepping_cpu
     trial.meter = hand.meter

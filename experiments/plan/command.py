@@ -14,7 +14,7 @@ from cell.configuration.config import CellConfig
 from cell.products.declared import declared_from
 from cell.products.loading import load_product
 from cell.products.product import Product
-from experiments.plan.options import PlanOptions
+from experiments.plan.options import MATRICES, PAGE, PLAN, PlanOptions
 from experiments.plan.page import write_page
 from experiments.reporting.output import write_arrays
 from planning.assembly_plan.explain import (
@@ -92,15 +92,17 @@ def run_plan(
     seconds = {"general rule": time.perf_counter() - started}
     remarks = [remark.text() for remark in bolt_remarks(described, fixing.matrices.solids)]
     out.mkdir(parents=True, exist_ok=True)
-    page = out / "plan.html"
-    page.unlink(missing_ok=True)  # A page of an earlier plan would not match.
-    save_plan(fixing, out / "plan.json", general_rule=choices_to_list(choices))
-    save_matrices(fixing, out / "matrices.npz")
+    page = out / PAGE
+    save_matrices(fixing, out / MATRICES)
     if html:
         with console.status(f"Pictures for {page.name} ..."):
             seconds[page.name] = write_page(
                 page, described, fixing, choices, verdict, setup, remarks
             )
+    else:
+        page.unlink(missing_ok=True)  # A page of an earlier plan would not match.
+    # Last: whoever finds it finds what belongs to it.
+    save_plan(fixing, out / PLAN, general_rule=choices_to_list(choices))
     _print_rule(console, choices, explain, remarks)
     if fixing.orders:
         seconds = {"orders": fixing.orders.seconds} | seconds

@@ -7,6 +7,8 @@ from pathlib import Path
 
 from cell.products.read_options import ReadOptions
 
+PLAN, MATRICES, PAGE = "plan.json", "matrices.npz", "plan.html"  # What is written.
+
 
 @dataclass(frozen=True)
 class PlanOptions:

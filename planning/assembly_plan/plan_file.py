@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 from collections.abc import Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from cell.errors import InputError
+from cell.whole_file import whole_file
 from planning.assembly_plan.order_search import AssemblyLine
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import READING, FixingStep, Stop
@@ -77,12 +77,11 @@ def save_plan(plan: FixingPlan, file: Path, **sections: Any) -> None:
         file: ``plan.json``.
         sections: Further sections of the file, plain values by name, which ``load_plan`` ignores.
     """
-    partial = file.with_name(file.name + ".part")
     # One line per key: a matrix row on a line each would run to 100 000 lines for 100 parts.
     data = plan_to_dict(plan) | sections
     lines = [f" {json.dumps(key)}: {json.dumps(value)}" for key, value in data.items()]
-    partial.write_text("{\n" + ",\n".join(lines) + "\n}\n")
-    os.replace(partial, file)
+    with whole_file(file) as temporary:
+        temporary.write_text("{\n" + ",\n".join(lines) + "\n}\n", encoding="utf-8")
 
 
 def load_plan(file: Path) -> FixingPlan:
@@ -92,7 +91,7 @@ def load_plan(file: Path) -> FixingPlan:
         InputError: The file cannot be read, or is not a plan.
     """
     try:
-        return plan_from_dict(json.loads(file.read_text()))
+        return plan_from_dict(json.loads(file.read_text(encoding="utf-8")))
     except OSError as error:
         raise InputError(f"Plan file '{file}' cannot be read: {error.strerror}.") from error
     except KeyError as error:

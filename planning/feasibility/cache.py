@@ -1,8 +1,9 @@
 """Cache of matrices, keyed by content: planning the same parts again only reads a file.
 
 The key is a digest of everything that determines the matrices: vertices and faces of every part in
-the product frame, everything declared, the tolerance, and this package's own source, so that a new
-version never reads results of an old one. A file that cannot be read counts as absent.
+the product frame, everything declared, the tolerance, this package's own source and the versions of
+the libraries that compute, so that a new version never reads results of an old one. A file that
+cannot be read, or is not what was written, counts as absent.
 """
 
 from __future__ import annotations
@@ -10,17 +11,19 @@ from __future__ import annotations
 import hashlib
 import json
 import os
-import tempfile
-import zipfile
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import asdict
 from functools import cache
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from cell.errors import CellError
 from cell.products.product import Product
+from cell.whole_file import whole_file
 from planning.feasibility.cad_threads import CadThread
 from planning.feasibility.directions import DIRECTIONS
 from planning.feasibility.interference import Blocker, Interference
@@ -29,6 +32,9 @@ from planning.feasibility.overlaps import Overlap, Overlaps
 from planning.feasibility.solids import Solid, solids_of
 from planning.feasibility.tolerance import Tolerances
 from planning.feasibility.undercut import Undercut
+
+LIBRARIES = ("manifold3d", "numpy", "python-fcl", "scipy", "trimesh")  # What computes the matrices.
+CHECKSUM = "checksum"  # Of a file, over everything else in it.
 
 
 def user_cache() -> Path:
@@ -77,6 +83,7 @@ def _source_digest() -> bytes:
     digest = hashlib.blake2b()
     for file in sorted(Path(__file__).parent.glob("*.py")):
         digest.update(file.read_bytes())
+    digest.update(json.dumps([version(library) for library in LIBRARIES]).encode())
     return digest.digest()
 
 
@@ -99,22 +106,30 @@ def save_matrices(matrices: AssemblyMatrices, file: Path) -> None:
             -1, 4
         ),
     }
-    try:
+    arrays[CHECKSUM] = np.array(_checksum(arrays))
+    with suppress(OSError, CellError):
         file.parent.mkdir(parents=True, exist_ok=True)
-        with tempfile.NamedTemporaryFile(dir=file.parent, suffix=".part", delete=False) as stream:
+        with whole_file(file) as temporary, temporary.open("wb") as stream:
             np.savez(stream, allow_pickle=False, **arrays)
-        os.replace(stream.name, file)
-    except OSError:
-        return
 
 
 def load_matrices(file: Path, solids: Mapping[str, Solid]) -> AssemblyMatrices | None:
     """Return what ``save_matrices`` wrote for these parts, or None if there is no such file."""
     try:
         with np.load(file) as arrays:
-            return _restored({name: arrays[name] for name in arrays.files}, solids)
-    except (OSError, ValueError, KeyError, TypeError, zipfile.BadZipFile):
+            found = {name: arrays[name] for name in arrays.files}
+        stated = str(found.pop(CHECKSUM))
+        return _restored(found, solids) if stated == _checksum(found) else None
+    except Exception:  # Damaged archives raise nearly anything: what is read is a copy, not needed.
         return None
+
+
+def _checksum(arrays: Mapping[str, np.ndarray]) -> str:
+    digest = hashlib.blake2b(digest_size=20)
+    for name, array in sorted(arrays.items()):
+        digest.update(f"{name} {array.dtype.str} {array.shape}\n".encode())
+        digest.update(np.ascontiguousarray(array).tobytes())
+    return digest.hexdigest()
 
 
 def _restored(arrays: Mapping[str, Any], solids: Mapping[str, Solid]) -> AssemblyMatrices | None:
