@@ -23,6 +23,7 @@ from cell.fixtures.base import Fixture
 from cell.fixtures.wiring import wire_fixture
 from cell.link_policy import add_links
 from cell.machines.arm import Arm
+from cell.machines.cameras.camera import Camera, cameras_of
 from cell.machines.devices import add_arms, make_drives
 from cell.machines.drive import JointDrive
 from cell.machines.driver import Driver
@@ -56,6 +57,7 @@ class Cell:
         links: Contacts that stick, as springs.
         sleeper: Puts parts and base to sleep.
         force_plate: Wrench sensor under the jig.
+        cameras: By name: "above", and "hand_eye" if it is mounted.
         ports: Inputs and outputs by name.
         monitor: For `Simulator.set_monitor`.
         diagram: The built diagram; None until the caller of `add_cell` has built theirs.
@@ -73,6 +75,7 @@ class Cell:
     links: ContactLinks
     sleeper: Sleep
     force_plate: WrenchSensor
+    cameras: Mapping[str, Camera]
     ports: Ports
     monitor: Monitor
     diagram: Diagram | None = None
@@ -230,6 +233,7 @@ def add_cell(
         links=links,
         sleeper=wiring.sleeper,
         force_plate=force_plate,
+        cameras=cameras_of(plant, scene_graph, config.workcell.X_WJ, config.camera),
         ports=ports,
         monitor=Monitor(counter, reset, (fixture, threads, links)),
     )

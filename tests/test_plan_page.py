@@ -29,7 +29,7 @@ from experiments.plan.drawn import SHOWN, Body, DrawnProduct, Shape
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
-from experiments.reporting.render import rendering_problem
+from cell.machines.cameras.rendering import rendering_problem
 from planning import plan
 from planning.assembly_plan.verdict import verdict_of
 from planning.feasibility.bolt_remark import bolt_remarks

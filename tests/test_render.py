@@ -12,8 +12,9 @@ from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.multibody.tree import SpatialInertia
 from pydrake.systems.framework import DiagramBuilder
 
-from experiments.reporting import render
-from experiments.reporting.render import NoRendering, View, rendering_problem, take_picture
+from cell.machines.cameras import rendering
+from cell.machines.cameras.rendering import NoRendering, rendering_problem
+from experiments.reporting.render import View, take_picture
 
 # From +y, so that +x is on the left of the picture.
 VIEW = View(p_WC=(0.0, 2.0, 0.5), p_WTarget=(0.0, 0.0, 0.5), width=120, height=80)
@@ -106,7 +107,7 @@ def test_missing_library_is_a_reason_not_a_crash(
 ) -> None:
     scene_graph, root, _ = red_box
     done = subprocess.CompletedProcess([], code, "", stderr)
-    monkeypatch.setattr(render.subprocess, "run", lambda *_, **__: done)
+    monkeypatch.setattr(rendering.subprocess, "run", lambda *_, **__: done)
     problem = rendering_problem()
     assert problem is not None
     assert reason in problem
@@ -119,5 +120,5 @@ def test_probe_that_hangs_is_given_up(no_cached_probe, monkeypatch) -> None:
     def hang(command, *, timeout, **_):
         raise subprocess.TimeoutExpired(command, timeout)
 
-    monkeypatch.setattr(render.subprocess, "run", hang)
+    monkeypatch.setattr(rendering.subprocess, "run", hang)
     assert "no picture after 120 s" in (rendering_problem() or "")

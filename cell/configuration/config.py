@@ -22,7 +22,13 @@ from cell.configuration.activities import (
 )
 from cell.configuration.config_file import parse_overrides, read_config_file
 from cell.configuration.frozen_dict import FrozenDict
-from cell.configuration.machines import ArmConfig, DriverConfig, SimulationConfig, WorkcellConfig
+from cell.configuration.machines import (
+    ArmConfig,
+    CameraConfig,
+    DriverConfig,
+    SimulationConfig,
+    WorkcellConfig,
+)
 from cell.configuration.sections import changed
 from cell.fixtures.soft_jig.parameters import JigParameters
 
@@ -49,6 +55,7 @@ class CellConfig:
     insertion: InsertionConfig = InsertionConfig()
     disturbance: DisturbanceConfig = DisturbanceConfig()
     sensor: SensorConfig = SensorConfig()
+    camera: CameraConfig = CameraConfig()
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "arms", FrozenDict(self.arms))

@@ -169,3 +169,85 @@ class DriverConfig:
         "alone.",
         "[M] The jig alone carries about 0.27 N m; then the part turns in its imprint.",
     )  # fmt: skip
+
+
+@dataclass(frozen=True)
+class CameraConfig:
+    """The depth cameras: one on the hand that grips, if it is mounted, one fixed above the jig."""
+
+    mounted: bool = setting(
+        False, "", "Whether the hand carries a camera; it then is in the collision model, too.",
+        "[S] The paper's discussion: a hand-eye RealSense D435.",
+    )  # fmt: skip
+    p_MC: tuple[float, float, float] = setting(
+        (0.0, -0.075, 0.035), "m", "Camera on the hand: its origin in the tool's frame mount.",
+        "[M] Every look at the jig from 45 to 88 deg above, at 0.25 and 0.32 m, is reachable.",
+        at_least=-0.3, at_most=0.3,
+    )  # fmt: skip
+    tilt_deg: float = setting(
+        15.0, "deg", "By how much its axis is tilted towards the fingers.",
+        "[M] As p_MC; the fingers fill the lower fifth of the image.",
+        at_least=-90.0, at_most=90.0,
+    )  # fmt: skip
+    height_above_jig: float = setting(
+        0.5, "m", "Height of the fixed camera above the jig.",
+        "[A] Own choice: the paper gives none.",
+        above=0.1, at_most=3.0,
+    )  # fmt: skip
+    width: int = setting(
+        848, "", "Of the image in pixels.",
+        "[R] D400 data sheet: the depth resolution it is made for.",
+        at_least=64, at_most=1920,
+    )  # fmt: skip
+    height: int = setting(
+        480, "", "Of the image in pixels.",
+        "[R] D400 data sheet.",
+        at_least=48, at_most=1200,
+    )  # fmt: skip
+    focal_length: float = setting(
+        424.0, "", "In pixels.",
+        "[R] Half of 848 pixels at a horizontal field of view of 90 deg, Grunnet-Jepsen et al., "
+        "Subpixel linearity improvement for Intel RealSense depth cameras.",
+        above=10.0, at_most=5000.0,
+    )  # fmt: skip
+    baseline: float = setting(
+        0.05, "m", "Between the two infrared imagers.",
+        "[R] D400 data sheet: 50 mm.",
+        above=0.0, at_most=1.0,
+    )  # fmt: skip
+    disparity_noise: float = setting(
+        0.08, "", "Standard deviation of the disparity in pixels.",
+        "[R] 0.05 to 0.1 on textured surfaces, Intel's tuning guide for D400 cameras.",
+        at_least=0.0, at_most=10.0,
+    )  # fmt: skip
+    disparity_step: float = setting(
+        1.0 / 32.0, "", "Smallest difference of two disparities in pixels.",
+        "[R] D400 data sheet: 5 subpixel bits.",
+        above=0.0, at_most=10.0,
+    )  # fmt: skip
+    largest_disparity: float = setting(
+        126.0, "", "Disparities up to this are searched, in pixels: nothing nearer has a depth.",
+        "[R] D400 data sheet; with it the least depth is 0.168 m.",
+        above=1.0, at_most=1000.0,
+    )  # fmt: skip
+    disparity_bias: float = setting(
+        0.0, "", "Constant error of the disparity in pixels: a decalibrated camera.",
+        "[A] None; 0.1 moves a surface at 0.3 m by 0.4 mm.",
+        at_least=-5.0, at_most=5.0,
+    )  # fmt: skip
+    edge_loss: float = setting(
+        0.5, "", "Share of the pixels at an edge that have no depth.",
+        "[A] 0.5, plausible 0.3 to 1.",
+        at_least=0.0, at_most=1.0,
+    )  # fmt: skip
+    dropouts: float = setting(
+        0.01, "", "Share of all pixels that have no depth.",
+        "[A] 1 % on matt surfaces, plausible 0.2 to 5 %.",
+        at_least=0.0, at_most=1.0,
+    )  # fmt: skip
+
+    @property
+    def X_MC(self) -> RigidTransform:
+        """Pose of the camera C on the hand in the frame M, mount, of its tool."""
+        tilt = RollPitchYaw(-np.deg2rad(self.tilt_deg), 0.0, 0.0)
+        return RigidTransform(tilt, np.array(self.p_MC))

@@ -17,6 +17,7 @@ from cell.configuration.config import CellConfig
 from cell.errors import UnknownName
 from cell.machines.arm import Arm, Tool, add_arm, arm_drive
 from cell.machines.arms import arm_model
+from cell.machines.cameras.camera import add_hand_eye
 from cell.machines.drive import ArmDrive, JointDrive
 from cell.machines.driver import Driver, DriverDrive
 from cell.machines.gripper import Gripper, GripperDrive
@@ -111,4 +112,6 @@ def add_arms(
             return kind.add(plant, instance, own.tool_name, own.tool)
 
         arms[name] = add_arm(plant, name, arm_model(arm.model), arm, own.arm, kind.sdf, add_tool)
+        if kind.role == Gripper.role and config.camera.mounted:
+            add_hand_eye(plant, arms[name], config.camera)
     return arms

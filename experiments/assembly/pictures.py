@@ -5,7 +5,8 @@ from __future__ import annotations
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.run import StepResult
 from experiments.reporting.html_page import Picture
-from experiments.reporting.render import CELL_VIEW, JIG_VIEW, rendering_problem, take_picture
+from cell.machines.cameras.rendering import rendering_problem
+from experiments.reporting.render import CELL_VIEW, JIG_VIEW, take_picture
 
 VIEWS = {"cell": CELL_VIEW, "jig": JIG_VIEW}
 

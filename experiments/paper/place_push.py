@@ -28,7 +28,7 @@ from experiments.paper.trial import TrialRecord, check_fits
 from experiments.paper.trial_tasks import CRITERION, LOG, PICTURES, from_arrays
 from experiments.reporting.html_page import Picture
 from experiments.reporting.output import write_json
-from experiments.reporting.render import rendering_problem
+from cell.machines.cameras.rendering import rendering_problem
 from experiments.speed.meter import Meter
 
 PRODUCT = "motor_unit"

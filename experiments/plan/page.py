@@ -14,7 +14,7 @@ from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import page, pairs, section, table
 from experiments.reporting.output import write_text
-from experiments.reporting.render import rendering_problem
+from cell.machines.cameras.rendering import rendering_problem
 from planning.assembly_plan.explain import blocker_text, overlap_text, step_texts, stop_text
 from planning.assembly_plan.order_search import AssemblyLine
 from planning.assembly_plan.planner import FixingPlan

@@ -1,0 +1,1 @@
+"""Cameras: pinhole geometry, rendering, what a stereo camera makes of depth, and the device."""

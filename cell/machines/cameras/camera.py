@@ -1,0 +1,172 @@
+"""A depth camera: on the hand that grips, or fixed above the jig; it renders when it is asked.
+
+Both are RealSense D435 as far as the numbers go. Depth is that of the left infrared imager, with
+the errors of `stereo_depth`; the colour image is taken from the same place, as the maker's driver
+aligns it. Label images say which body each pixel shows: they are for making data and for verdicts,
+not for what is sensed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.geometry import (
+    Box,
+    ColorRenderCamera,
+    DepthRange,
+    DepthRenderCamera,
+    SceneGraph,
+)
+from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
+from pydrake.multibody.tree import RigidBody, SpatialInertia
+from pydrake.systems.framework import Context
+
+from cell.configuration.machines import CameraConfig
+from cell.machines.arm import Arm
+from cell.machines.cameras.pinhole import Pinhole
+from cell.machines.cameras.rendering import camera_core, rendering
+from cell.machines.cameras.stereo_depth import StereoDepth
+
+Array = NDArray[np.float64]
+
+HAND_EYE, ABOVE = "hand_eye", "above"  # Names of the two cameras.
+SIZE = (0.090, 0.025, 0.025)  # Of the housing along x, y and z of C [m] [R D400 data sheet].
+MASS = 0.072  # [kg] [R D400 data sheet]
+LENS = 0.0042  # Of the imagers, behind the front glass [m] [R D400 data sheet].
+FARTHEST = 10.0  # Depth that is rendered [m].
+ANODISED = (0.75, 0.76, 0.78, 1.0)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a camera took at one time.
+
+    Attributes:
+        time: [s].
+        X_WC: Where the camera was.
+        pinhole: Its geometry.
+        depth: (h, w) as measured [m], 0 where there is none.
+        color: (h, w, 3) bytes; None: not asked for.
+    """
+
+    time: float
+    X_WC: RigidTransform
+    pinhole: Pinhole
+    depth: Array
+    color: NDArray[np.uint8] | None = None
+
+    def points(self) -> Array:
+        """Return p_WQ (n, 3) of all pixels that have a depth [m]."""
+        p_CQ = self.pinhole.points(self.depth)
+        return p_CQ @ self.X_WC.rotation().matrix().T + self.X_WC.translation()
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A camera in the cell.
+
+    Attributes:
+        name: "hand_eye" or "above".
+        plant, scene_graph: Drake's.
+        body: What it is fixed to.
+        X_BC: Its frame C on that body: x to the right of the image, y down, z into the scene.
+        pinhole: Its geometry.
+        stereo: How it measures depth.
+    """
+
+    name: str
+    plant: MultibodyPlant
+    scene_graph: SceneGraph
+    body: RigidBody
+    X_BC: RigidTransform
+    pinhole: Pinhole
+    stereo: StereoDepth
+
+    def X_WC(self, root: Context) -> RigidTransform:
+        """Return where it is."""
+        context = self.plant.GetMyContextFromRoot(root)
+        return self.plant.EvalBodyPoseInWorld(context, self.body) @ self.X_BC
+
+    def take(self, root: Context, rng: np.random.Generator, *, color: bool = False) -> Picture:
+        """Take a picture of the scene as it is now; the state is not changed.
+
+        Args:
+            root: Context of the diagram.
+            rng: Of the depth noise.
+            color: Whether to take the colour image, too.
+
+        Raises:
+            NoRendering: This machine cannot render.
+        """
+        X_WC, world = self.X_WC(root), self.scene_graph.world_frame_id()
+        core = camera_core(self.pinhole.drake)
+        near_to_far = DepthRange(core.clipping().near(), FARTHEST)
+        with rendering(self.scene_graph, root) as query:
+            depth = query.RenderDepthImage(DepthRenderCamera(core, near_to_far), world, X_WC)
+            true = np.array(depth.data[:, :, 0], float)
+            rgb = None
+            if color:
+                image = query.RenderColorImage(ColorRenderCamera(core, False), world, X_WC)
+                rgb = np.array(image.data[:, :, :3])
+        measured = self.stereo.measured(true, rng)
+        return Picture(root.get_time(), X_WC, self.pinhole, measured, rgb)
+
+    def labels(self, root: Context) -> NDArray[np.int64]:
+        """Return the number of the body that each pixel shows (h, w): the truth."""
+        camera = ColorRenderCamera(camera_core(self.pinhole.drake), show_window=False)
+        with rendering(self.scene_graph, root) as query:
+            image = query.RenderLabelImage(
+                camera, self.scene_graph.world_frame_id(), self.X_WC(root)
+            )
+        return np.array(image.data[:, :, 0], int)
+
+
+def add_hand_eye(plant: MultibodyPlant, arm: Arm, config: CameraConfig) -> None:
+    """Put a camera on the tool of an arm, before the plant is finalized."""
+    instance = plant.AddModelInstance(f"{arm.name}_{HAND_EYE}")
+    inertia = SpatialInertia.SolidBoxWithMass(MASS, *SIZE)
+    body = plant.AddRigidBody(HAND_EYE, instance, inertia)
+    X_CHousing = RigidTransform([0.0, 0.0, LENS - SIZE[2] / 2.0])
+    friction = CoulombFriction(0.3, 0.3)  # [A] Anodised aluminium; it is not meant to touch.
+    plant.RegisterCollisionGeometry(body, X_CHousing, Box(*SIZE), "housing", friction)
+    plant.RegisterVisualGeometry(body, X_CHousing, Box(*SIZE), "housing", list(ANODISED))
+    mount = plant.GetFrameByName("mount", arm.tool.instance)
+    plant.WeldFrames(mount, body.body_frame(), config.X_MC)
+    plant.set_gravity_enabled(instance, False)  # The arm bears it, as it bears its tool.
+
+
+def cameras_of(
+    plant: MultibodyPlant, scene_graph: SceneGraph, X_WJ: RigidTransform, config: CameraConfig
+) -> Mapping[str, Camera]:
+    """Return the handles of the cameras in a cell, by name.
+
+    Args:
+        plant: With the camera on the hand, if it is mounted.
+        scene_graph: The plant's.
+        X_WJ: Where the jig stands.
+        config: Of the cameras.
+    """
+    pinhole = Pinhole.centred(config.width, config.height, config.focal_length)
+    stereo = StereoDepth(
+        focal_length=config.focal_length,
+        baseline=config.baseline,
+        noise=config.disparity_noise,
+        step=config.disparity_step,
+        most=config.largest_disparity,
+        bias=config.disparity_bias,
+        edge_loss=config.edge_loss,
+        dropouts=config.dropouts,
+    )
+    down = RotationMatrix.MakeXRotation(np.pi)
+    p_WC = X_WJ.translation() + np.array([0.0, 0.0, config.height_above_jig])
+    places = {ABOVE: (plant.world_body(), RigidTransform(down, p_WC))}
+    if config.mounted:
+        places[HAND_EYE] = (plant.GetBodyByName(HAND_EYE), RigidTransform())
+    return {
+        name: Camera(name, plant, scene_graph, body, X_BC, pinhole, stereo)
+        for name, (body, X_BC) in places.items()
+    }

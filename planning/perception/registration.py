@@ -1,0 +1,192 @@
+"""A part's pose from depth images of several views, by matching its surface point to plane.
+
+From a start that is a few millimetres and degrees off, the measured points are paired with the
+nearest points of the surface that face the camera, and the pose is moved until their distances
+across the surface are least (Chen and Medioni, Object modelling by registration of multiple range
+images, 1992). Pairs are taken from a shrinking neighbourhood and weighted by a robust loss, since
+the part stands in a bag whose surface no model describes. A turn about the vertical is found last
+and least certainly: several starts about it are tried, and that of the least residual is kept.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.math import RigidTransform, RotationMatrix
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from cell.machines.cameras.camera import Picture
+from planning.perception.surface import Surface
+
+Array = NDArray[np.float64]
+
+MARGIN = 8e-3  # Of the region about the believed pose that is looked at [m] [A].
+POINTS = 2_000  # Of each view; more say the same again [M].
+FEWEST = 60  # Pairs of all views, below which there is nothing to go by.
+FACING = 0.15  # Least cosine between a surface and the view: 81 degrees [A].
+REACH, LEAST_REACH, SHRINK = 4e-3, 1.2e-3, 0.8  # Of a pair at first and at last [m], per round.
+LOSS = 6e-4  # Distances beyond this lose their weight [m]: 1.5 of a D435's at 0.32 m.
+ROUNDS = 40
+STILL = 2e-6  # A round that moves and turns by less is the last [m, rad].
+
+
+@dataclass(frozen=True, eq=False)
+class View:
+    """Measured points and where they were seen from.
+
+    Attributes:
+        points: (n, 3) p_WQ [m].
+        p_WC: (3,) position of the camera [m].
+    """
+
+    points: Array
+    p_WC: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Registration:
+    """A registered pose.
+
+    Attributes:
+        X_WP: The pose.
+        covariance: (6, 6) of its error, ordered as in `planning.perception.belief.Estimate`.
+        residual: Mean distance of the points across the surface, those without a partner counted
+            as `LEAST_REACH` [m].
+        share: Of the points that have a partner.
+    """
+
+    X_WP: RigidTransform
+    covariance: Array
+    residual: float
+    share: float
+
+
+def views_of(
+    pictures: Iterable[Picture], surface: Surface, X_WP: RigidTransform, rng: np.random.Generator
+) -> list[View]:
+    """Return what pictures show near the believed pose of a part.
+
+    Args:
+        pictures: With depth.
+        surface: Of the part.
+        X_WP: Believed pose.
+        rng: Chooses among too many points.
+    """
+    views = []
+    for picture in pictures:
+        p_WQ = picture.points()
+        p_PQ = _in(X_WP, p_WQ)
+        near = ((p_PQ > surface.lower - MARGIN) & (p_PQ < surface.upper + MARGIN)).all(axis=1)
+        chosen = np.flatnonzero(near)
+        if len(chosen) > POINTS:
+            chosen = rng.choice(chosen, POINTS, replace=False)
+        views.append(View(p_WQ[chosen], picture.X_WC.translation()))
+    return views
+
+
+def register(
+    surface: Surface, views: Sequence[View], X_WP: RigidTransform, turns_deg: Sequence[float]
+) -> Registration | None:
+    """Return the pose that fits the views best, or None if they show too little of the part.
+
+    Args:
+        surface: Of the part.
+        views: At least one.
+        X_WP: Believed pose: the start.
+        turns_deg: Further starts are turned by this about the vertical through its middle [deg].
+    """
+    centre = RigidTransform(X_WP @ surface.centre)
+    found = []
+    for turn in (0.0, *turns_deg):
+        spin = RigidTransform(RotationMatrix.MakeZRotation(np.deg2rad(turn)), np.zeros(3))
+        found.append(_registered(surface, views, centre @ spin @ centre.inverse() @ X_WP))
+    seen = [one for one in found if one is not None]
+    return min(seen, key=lambda one: one.residual) if seen else None
+
+
+@dataclass
+class _Sums:
+    """Normal equations of the pairs of all views, for a small motion (w, v) of points in P."""
+
+    form: Array
+    side: Array
+    distances: list[Array]
+    pairs: int = 0
+
+
+def _registered(
+    surface: Surface, views: Sequence[View], X_WP: RigidTransform
+) -> Registration | None:
+    """Return the pose to which one start leads, or None."""
+    total = sum(len(view.points) for view in views)
+    reach = REACH
+    sums = _summed(surface, views, X_WP, reach)
+    for _ in range(ROUNDS):
+        if sums.pairs < FEWEST:
+            return None
+        damping = 1e-9 * np.trace(sums.form) * np.eye(6)
+        step = np.linalg.solve(sums.form + damping, sums.side)
+        moved = RigidTransform(
+            RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix()), step[3:]
+        )
+        X_WP = X_WP @ moved.inverse()
+        X_WP = RigidTransform(RotationMatrix.ProjectToRotationMatrix(X_WP.rotation().matrix()),
+                              X_WP.translation())  # fmt: skip
+        if reach == LEAST_REACH and np.abs(step).max() < STILL:
+            break
+        reach = max(LEAST_REACH, SHRINK * reach)
+        sums = _summed(surface, views, X_WP, reach)
+    if sums.pairs < FEWEST:
+        return None
+    distances = np.concatenate(sums.distances)
+    spread = 1.4826 * float(np.median(np.abs(distances)))
+    lost = (total - sums.pairs) * LEAST_REACH
+    residual = (np.minimum(np.abs(distances), LEAST_REACH).sum() + lost) / max(total, 1)
+    return Registration(
+        X_WP, _covariance(sums, spread, X_WP), float(residual), sums.pairs / max(total, 1)
+    )
+
+
+def _summed(surface: Surface, views: Sequence[View], X_WP: RigidTransform, reach: float) -> _Sums:
+    """Return the normal equations of all pairs within a reach [m]."""
+    sums = _Sums(np.zeros((6, 6)), np.zeros(6), [])
+    for view in views:
+        faces = surface.facing(_in(X_WP, view.p_WC[None])[0], FACING)
+        if not faces.any() or not len(view.points):
+            continue
+        points, normals = surface.points[faces], surface.normals[faces]
+        p_PQ = _in(X_WP, view.points)
+        apart, partner = KDTree(points).query(p_PQ, distance_upper_bound=reach)
+        near = np.isfinite(apart)
+        p, n = p_PQ[near], normals[partner[near]]
+        distance = np.einsum("ij,ij->i", p - points[partner[near]], n)
+        weight = 1.0 / np.sqrt(1.0 + (distance / LOSS) ** 2)
+        rows = np.concatenate([np.cross(p, n), n], axis=1)
+        sums.form += (rows * weight[:, None]).T @ rows
+        sums.side -= (rows * weight[:, None]).T @ distance
+        sums.distances.append(distance)
+        sums.pairs += len(p)
+    return sums
+
+
+def _covariance(sums: _Sums, spread: float, X_WP: RigidTransform) -> Array:
+    """Return the covariance of a pose: turns about the axes of P, offsets along those of W.
+
+    Args:
+        sums: Of the last round.
+        spread: Standard deviation of a distance [m].
+        X_WP: The pose.
+    """
+    form = sums.form + 1e-9 * np.trace(sums.form) * np.eye(6)
+    R = np.kron(np.diag([1.0, 0.0]), np.eye(3))
+    R[3:, 3:] = X_WP.rotation().matrix()
+    return spread**2 * R @ np.linalg.inv(form) @ R.T
+
+
+def _in(X_WP: RigidTransform, p_WQ: Array) -> Array:
+    """Return points (n, 3) of W in P."""
+    return (p_WQ - X_WP.translation()) @ X_WP.rotation().matrix()
