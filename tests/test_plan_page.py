@@ -19,6 +19,7 @@ from tiny_products import interlocked_links, peg_in_hole, stack_of_three, tube_a
 
 from cell import CellConfig
 from cell.fixtures.soft_jig import BagParameters
+from cell.machines.cameras.rendering import rendering_problem
 from cell.products.loading import load_product
 from cell.products.mesh_io import obj_text
 from cell.products.product import Part, Product
@@ -29,7 +30,6 @@ from experiments.plan.drawn import SHOWN, Body, DrawnProduct, Shape
 from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.page import write_page
 from experiments.plan.scene import projected, view_of
-from cell.machines.cameras.rendering import rendering_problem
 from planning import plan
 from planning.assembly_plan.verdict import verdict_of
 from planning.feasibility.bolt_remark import bolt_remarks

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+from cell.machines.cameras.rendering import rendering_problem
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.run import StepResult
 from experiments.reporting.html_page import Picture
-from cell.machines.cameras.rendering import rendering_problem
 from experiments.reporting.render import CELL_VIEW, JIG_VIEW, take_picture
 
 VIEWS = {"cell": CELL_VIEW, "jig": JIG_VIEW}

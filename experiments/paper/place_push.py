@@ -11,6 +11,7 @@ from rich.console import Console
 
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
+from cell.machines.cameras.rendering import rendering_problem
 from cell.products.loading import load_product
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
@@ -28,7 +29,6 @@ from experiments.paper.trial import TrialRecord, check_fits
 from experiments.paper.trial_tasks import CRITERION, LOG, PICTURES, from_arrays
 from experiments.reporting.html_page import Picture
 from experiments.reporting.output import write_json
-from cell.machines.cameras.rendering import rendering_problem
 from experiments.speed.meter import Meter
 
 PRODUCT = "motor_unit"

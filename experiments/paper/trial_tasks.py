@@ -8,6 +8,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.errors import UnknownName
+from cell.machines.cameras.rendering import rendering_problem
 from cell.products.loading import load_product
 from experiments.campaigns.trial import Outcome, Task
 from experiments.paper.cases import case_named, case_seed, judged
@@ -23,7 +24,7 @@ from experiments.paper.trial import (
     run_trial,
 )
 from experiments.reporting.output import write_arrays
-from experiments.reporting.render import View, rendering_problem, take_picture
+from experiments.reporting.render import View, take_picture
 from experiments.speed.calibration import Kernel
 from experiments.speed.meter import Meter, Spent
 from planning.operations.phase_class import PhaseClass

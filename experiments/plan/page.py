@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from html import escape
 from pathlib import Path
 
+from cell.machines.cameras.rendering import rendering_problem
 from cell.products.product import Product
 from experiments.plan.arrangement import exploded, step_arrangement
 from experiments.plan.drawn import DrawnProduct
@@ -14,7 +15,6 @@ from experiments.plan.heatmaps import contact_map, direction_maps
 from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import page, pairs, section, table
 from experiments.reporting.output import write_text
-from cell.machines.cameras.rendering import rendering_problem
 from planning.assembly_plan.explain import blocker_text, overlap_text, step_texts, stop_text
 from planning.assembly_plan.order_search import AssemblyLine
 from planning.assembly_plan.planner import FixingPlan

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from matplotlib.image import imsave
 from pydrake.geometry import ColorRenderCamera, SceneGraph
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 from pydrake.systems.framework import Context
 from pydrake.systems.sensors import CameraInfo
 
+from cell.machines.cameras.pinhole import looking_at
 from cell.machines.cameras.rendering import camera_core, rendering
 
 
@@ -35,11 +36,7 @@ class View:
     @property
     def X_WC(self) -> RigidTransform:
         """Pose of the camera: x to the right, y down, z into the image."""
-        forward = np.subtract(self.p_WTarget, self.p_WC)
-        right = np.cross(forward, [0.0, 0.0, 1.0])
-        columns = [right, np.cross(forward, right), forward]
-        R_WC = np.stack([column / np.linalg.norm(column) for column in columns], axis=1)
-        return RigidTransform(RotationMatrix(R_WC), np.array(self.p_WC))
+        return looking_at(self.p_WC, self.p_WTarget)
 
     def camera(self) -> ColorRenderCamera:
         """Return Drake's description of the camera."""

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from scipy.spatial import KDTree
 
 Array = NDArray[np.float64]
 
 SPACING = 7e-4  # Between points [m] [A]: below what a depth image resolves at 0.3 m, 0.75 mm.
+FACING = 0.15  # Least cosine between a surface and the view: 81 degrees [A].
+SAME_SIDE = 0.9986  # Cosine of 3 degrees: nearer directions see the same.
 FEWEST, MOST = 2_000, 40_000  # Points, whatever the size of the part.
 
 
@@ -42,8 +45,44 @@ class Surface:
         """(3,) middle of the bounding box [m]."""
         return (self.lower + self.upper) / 2.0
 
-    def facing(self, p_PC: Array, least: float) -> NDArray[np.bool_]:
-        """Return which points (n,) face a camera at p_PC (3,), by a least cosine."""
-        sight = p_PC - self.points
-        cosine = np.einsum("ij,ij->i", sight, self.normals) / np.linalg.norm(sight, axis=1)
-        return cosine > least
+
+@dataclass(frozen=True, eq=False)
+class Side:
+    """The part of a surface that faces a camera, for queries of nearest points.
+
+    Attributes:
+        p_PC: (3,) position of the camera [m].
+        points: (n, 3) [m].
+        normals: (n, 3) outward.
+        tree: Of the points.
+    """
+
+    p_PC: Array
+    points: Array
+    normals: Array
+    tree: KDTree
+
+
+@dataclass
+class Sides:
+    """Sides of a surface, each built once for cameras in about the same direction."""
+
+    surface: Surface
+    _built: list[Side] = field(default_factory=list)
+
+    def facing(self, p_PC: Array) -> Side | None:
+        """Return the side that faces a camera at p_PC (3,) [m]; None if nothing does."""
+        middle = self.surface.centre
+        sight = (p_PC - middle) / np.linalg.norm(p_PC - middle)
+        for side in self._built:
+            known = side.p_PC - middle
+            if sight @ known > SAME_SIDE * np.linalg.norm(known):
+                return side
+        rays = p_PC - self.surface.points
+        cosine = np.einsum("ij,ij->i", rays, self.surface.normals) / np.linalg.norm(rays, axis=1)
+        faces = cosine > FACING
+        if not faces.any():
+            return None
+        points, normals = self.surface.points[faces], self.surface.normals[faces]
+        self._built.append(Side(p_PC, points, normals, KDTree(points)))
+        return self._built[-1]

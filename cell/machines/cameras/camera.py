@@ -9,7 +9,7 @@ not for what is sensed.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -85,6 +85,10 @@ class Camera:
     X_BC: RigidTransform
     pinhole: Pinhole
     stereo: StereoDepth
+
+    def placed(self, X_WC: RigidTransform) -> Camera:
+        """Return such a camera, fixed at a pose in the world."""
+        return replace(self, body=self.plant.world_body(), X_BC=X_WC)
 
     def X_WC(self, root: Context) -> RigidTransform:
         """Return where it is."""

@@ -10,12 +10,27 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.systems.sensors import CameraInfo
 
 Array = NDArray[np.float64]
 
 HALF_PIXEL = 0.5  # From the centre of a pixel to its corner.
+
+
+def looking_at(p_WC: ArrayLike, p_WTarget: ArrayLike) -> RigidTransform:
+    """Return the pose X_WC of an upright camera that looks at a point.
+
+    Args:
+        p_WC: (3,) where it is [m].
+        p_WTarget: (3,) what it looks at, not vertically above or below it [m].
+    """
+    forward = np.subtract(p_WTarget, p_WC)
+    right = np.cross(forward, [0.0, 0.0, 1.0])
+    columns = [right, np.cross(forward, right), forward]
+    R_WC = np.stack([column / np.linalg.norm(column) for column in columns], axis=1)
+    return RigidTransform(RotationMatrix(R_WC), np.asarray(p_WC, float))
 
 
 @dataclass(frozen=True)
@@ -54,7 +69,8 @@ class Pinhole:
 
     def project(self, p_CQ: Array) -> Array:
         """Return the pixels (n, 2) of points (n, 3) in front of the camera [m]."""
-        return self.focal_length * p_CQ[:, :2] / p_CQ[:, 2:] + [self.cx, self.cy]
+        centre = np.array([self.cx, self.cy])
+        return np.asarray(self.focal_length * p_CQ[:, :2] / p_CQ[:, 2:] + centre, np.float64)
 
     def points(self, depth: Array) -> Array:
         """Return p_CQ (n, 3) of every pixel that has a depth [m].

@@ -1,0 +1,1 @@
+"""What the experiments with cameras share: errors of estimates, and pictures with boxes."""
