@@ -15,7 +15,6 @@ from __future__ import annotations
 import sys
 import time
 import zlib
-from collections import deque
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -31,11 +30,14 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes
 from cell.machines.cameras.camera import ABOVE, Picture, cameras_of
 from cell.machines.cameras.rendering import NoRendering, rendering_problem
 from cell.products.loading import load_product
-from experiments.cli.common import BadUsage, Common, exit_code
-from experiments.paper.cases import Case, run_cases
-from experiments.paper.place_push import cases_of
+from cell.whole_file import whole_file
+from experiments.cli.common import BadUsage, Common
+from experiments.cli.ending import exit_code
+from experiments.paper.cases import case_seed, cases_of
 from experiments.paper.rig.stage import Observer
-from experiments.reporting.output import output_folder, whole_file, write_json
+from experiments.paper.rig_hand import RigBench
+from experiments.paper.trial import TrialDisturbance, run_trial
+from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import versions
 from experiments.vision.boxes import ESTIMATE, TRUTH, with_boxes
 from experiments.vision.pose_error import ADD_SHARE, PoseError, pose_error
@@ -103,13 +105,11 @@ def run(options: Options) -> int:
     product, rows = load_product("motor_unit"), {}
     with output_folder(Path(options.common.out)) as out:
         for case in cases:
-            eye = _Eye(options, out)
+            eye = _Eye(options, out, case.label)
+            bench = RigBench.build(config, product, case.posture)
             for number in range(options.trials):
-                seed = options.common.seed + number
-                trial = run_cases(
-                    [case], product=product, config=config, trials=1, seed=seed, watch=eye.see
-                )
-                deque(trial, maxlen=0)
+                rng = case_seed(options.common.seed, case.label, number)
+                run_trial(bench.begin(TrialDisturbance.draw(config, rng)), None, eye.see)
             rows[case.label] = _summary(eye.looks)
         report = {
             "seed": options.common.seed,
@@ -128,16 +128,17 @@ class _Eye:
 
     options: Options
     out: Path
+    label: str
     looks: list[Look] = field(default_factory=list)
 
-    def see(self, case: Case, event: str, observer: Observer) -> None:
+    def see(self, event: str, observer: Observer) -> None:
         """Look at a part that has been placed."""
         if event != "placed":
             return
         stage, X_WTrue, options = observer.stage, observer.X_WP, self.options
         cameras = cameras_of(stage.plant, stage.scene_graph, observer.X_WJ, stage.config.camera)
         surface = Surface.of(stage.part.part.mesh)
-        stream = zlib.crc32(case.label.encode())
+        stream = zlib.crc32(self.label.encode())
         rng = np.random.default_rng([options.common.seed, stream, len(self.looks)])
         for _ in range(options.looks):
             first = not self.looks
@@ -156,7 +157,7 @@ class _Eye:
             if estimate is not None and first:
                 boxes = {TRUTH: X_WTrue, ESTIMATE: estimate.X_WP}
                 image = with_boxes(pictures[0], surface, boxes)
-                with whole_file(self.out / f"{case.label.replace('/', '_')}.png") as file:
+                with whole_file(self.out / f"{self.label.replace('/', '_')}.png") as file:
                     file.write_bytes(image)
 
 

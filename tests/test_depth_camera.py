@@ -11,7 +11,7 @@ from cell import CellConfig, build_cell, load_product
 from cell.configuration.machines import CameraConfig
 from cell.machines.cameras.camera import ABOVE, HAND_EYE, Camera, cameras_of
 from cell.machines.cameras.pinhole import HALF_PIXEL, Pinhole
-from cell.machines.cameras.rendering import camera_core, rendering
+from cell.machines.cameras.rendering import camera_core, rendering, rendering_problem  # noqa: F401
 from cell.machines.cameras.stereo_depth import StereoDepth
 
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")

@@ -55,6 +55,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "assembly": {"reporting"},
         "campaigns": {"reporting", "assembly"},
         "speed": {"reporting", "assembly"},
+        "vision": set(),
         "paper": {"reporting", "campaigns", "speed"},
         "cli": {"reporting", "plan", "assembly", "campaigns", "paper"},
     },

@@ -81,4 +81,4 @@ class Pinhole:
         row, column = np.nonzero(depth > 0.0)
         z = depth[row, column].astype(float)
         x, y = ((k - c) / self.focal_length for k, c in ((column, self.cx), (row, self.cy)))
-        return np.column_stack([x * z, y * z, z])
+        return np.asarray(np.column_stack([x * z, y * z, z]), np.float64)
