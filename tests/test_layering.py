@@ -47,6 +47,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "motion": set(),
         "perception": set(),
         "operations": {"feasibility", "motion", "assembly_plan", "perception"},
+        "product_draft": {"feasibility", "assembly_plan"},
     },
     "experiments": {
         "reporting": set(),
@@ -54,9 +55,10 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "plan": {"reporting"},
         "assembly": {"reporting"},
         "campaigns": {"reporting", "assembly"},
+        "product": {"reporting"},
         "speed": {"reporting", "assembly"},
         "paper": {"reporting", "campaigns", "speed"},
-        "cli": {"reporting", "plan", "assembly", "campaigns", "paper"},
+        "cli": {"reporting", "plan", "assembly", "campaigns", "paper", "product"},
     },
 }  # fmt: skip
 EVERYWHERE = {

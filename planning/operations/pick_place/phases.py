@@ -30,6 +30,7 @@ from planning.operations.placement import (
     Placement,
     Suits,
     anywhere,
+    brought_to,
     choose_placement,
 )
 from planning.operations.station import FIXTURE, Station
@@ -61,8 +62,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     """Yield the phases of a step: the part upright, and so that later parts can be brought."""
     (part,) = step.parts
     product = station.cell.product
-    later = tuple(fit.hole for fit in product.fits if fit.shaft == part)
-    yield from pick_place(station, part, product.up, later)
+    yield from pick_place(station, part, product.up, brought_to(product, part))
     yield from look(station, PlacePhase.LOOK_AGAIN, part)
 
 
