@@ -75,6 +75,8 @@ def run_init(wanted: Wanted, out: Path, config: CellConfig, *, quiet: bool) -> i
 def _read(wanted: Wanted) -> Product:
     if is_product_file(str(wanted.source)):
         raise InputError(f"'{wanted.source}' is a product already; init takes CAD.")
+    if wanted.torque is not None and not 0.0 < wanted.torque < 1e3:
+        raise InputError(f"--torque must be above zero, in N m, not {wanted.torque:g}.")
     if wanted.up is not None and wanted.up not in DIRECTIONS:
         raise InputError(f"--up is one of {', '.join(DIRECTIONS)}, not '{wanted.up}'.")
     options = ReadOptions(units=wanted.units, split=wanted.split, leave_out=wanted.leave_out)
