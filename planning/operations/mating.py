@@ -136,6 +136,17 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     yield from let_go(station, part, reach.grasp, RETREAT, both)
 
 
+def foresee_mating(station: Station, mating: Mating) -> None:
+    """Choose a grasp that fits where a part is taken and where it is put; believe it to be there.
+
+    Raises:
+        Unreachable: There is none.
+    """
+    X_WGoal = goal_pose(station, mating)
+    first(useful_grasps(station, mating, X_WGoal), mating.part, station)
+    station.belief.suppose(mating.part, X_WGoal)
+
+
 def goal_pose(station: Station, mating: Mating) -> RigidTransform:
     """Return the pose X_WP at which the part is seated, from what is believed."""
     on, part = station.part(mating.on), station.part(mating.part)

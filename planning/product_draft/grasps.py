@@ -6,7 +6,6 @@ from collections.abc import Sequence
 
 import numpy as np
 import trimesh
-from pydrake.geometry import Box
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.cad.nests import Nest
@@ -123,9 +122,9 @@ def _nest_in_part(nest: Nest, X_TrayP: RigidTransform) -> trimesh.Trimesh:
     """Return the boxes of a nest in the frame of the part in it [m]."""
     boxes = []
     for piece in nest.pieces:
-        shape = piece.shape
-        assert isinstance(shape, Box)
-        size = np.array([shape.width(), shape.depth(), shape.height()])
+        if isinstance(piece.shape, trimesh.Trimesh):
+            raise TypeError("a nest is made of boxes")
+        size = np.asarray(piece.shape.size())
         X_PS = X_TrayP.inverse() @ piece.X_PS
         boxes.append(trimesh.creation.box(size, X_PS.GetAsMatrix4()))
     return joined(boxes)

@@ -3,7 +3,7 @@
 from cell.products.joints import Fit
 from planning.operations.insert_shaft.limits import LIMITS
 from planning.operations.insert_shaft.measures import measure
-from planning.operations.insert_shaft.phases import carry_out
+from planning.operations.insert_shaft.phases import carry_out, foresee
 from planning.operations.insert_shaft.plots import plots
 from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.placement import enters_from_above
@@ -33,4 +33,5 @@ INSERT_SHAFT = Operation(
     joint=Fit,
     coarse=True,
     plan=plan,
+    foresee=foresee,
 )

@@ -58,6 +58,14 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         yield from place_bolt(station, bolt)
 
 
+def foresee(station: Station, step: Step) -> tuple[str, ...]:
+    """Choose the grasp of every bolt, and believe it to stand in its hole."""
+    for bolt in step.parts:
+        _grasp_for_hole(station, bolt)
+        station.belief.suppose(bolt, standing_pose(station, bolt))
+    return ()
+
+
 def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     """Yield the phases that stand a bolt in its hole.
 

@@ -4,7 +4,7 @@ from cell.products.joints import Rest
 from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.rest.limits import LIMITS
 from planning.operations.rest.measures import measure
-from planning.operations.rest.phases import carry_out
+from planning.operations.rest.phases import carry_out, foresee
 
 
 def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
@@ -24,4 +24,5 @@ REST = Operation(
     joint=Rest,
     coarse=True,
     plan=plan,
+    foresee=foresee,
 )

@@ -10,7 +10,7 @@ from cell.products.joints import Rest
 from cell.products.product import Product
 from cell.simulation.phase import Phase
 from planning.feasibility.directions import unit_vector
-from planning.operations.mating import Mating, mate
+from planning.operations.mating import Mating, foresee_mating, mate
 from planning.operations.operation import Step
 from planning.operations.station import Station
 
@@ -18,6 +18,12 @@ from planning.operations.station import Station
 def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     """Yield the phases of a step."""
     yield from mate(station, mating_of(station.cell.product, step), step.riders)
+
+
+def foresee(station: Station, step: Step) -> tuple[str, ...]:
+    """Choose the grasp of a step, and believe the part to be seated."""
+    foresee_mating(station, mating_of(station.cell.product, step))
+    return ()
 
 
 def mating_of(product: Product, step: Step) -> Mating:

@@ -28,7 +28,7 @@ from cell.simulation.phase import (
 from cell.workpieces.thread import BIT_SEAT
 from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
-from planning.operations.counter_hold import Coming, hold, park
+from planning.operations.counter_hold import Coming, from_the_side, hold, park
 from planning.operations.grasping import Reach, backed_off, let_go, opened, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
@@ -147,9 +147,7 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
         return come_beside(station, order[0], coming)
 
     def leaves_room(reach: Reach) -> bool:
-        jaws = opened(station.cell.gripper.model, reach.grasp).opening / 2
-        hand = {station.holder.name: reach.q_at, station.hand: np.full(2, jaws)}
-        return all(ways_above(station, bolt, hand) for bolt in order)
+        return _leaves_room(station, order, reach)
 
     if station.config.driver.counter_hold:
         grasp = yield from hold(station, clamped, meanwhile, leaves_room)
@@ -163,6 +161,29 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
             yield from tighten_bolt(station, bolt)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
     yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
+
+
+def foresee(station: Station, step: Step) -> tuple[str, ...]:
+    """See whether the driver reaches every bolt, beside the hand that holds against it."""
+    clamped = station.cell.product.screws[step.parts[0]].clamps
+    away = {station.holder.name: station.holder.home}
+    for bolt in step.parts:
+        if not ways_above(station, bolt, away):
+            _above(station, bolt, away)  # Raises what is said of it.
+    if not station.config.driver.counter_hold:
+        return ()
+    for reach in from_the_side(station, clamped):
+        if _leaves_room(station, step.parts, reach):
+            return ()
+    alone = "leaves room for the driver: the jig alone bears the torque"
+    return (f"no grasp of '{clamped}' from the side {alone}",)
+
+
+def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
+    """Return whether the driver reaches bolts while the hand holds what they clamp."""
+    jaws = opened(station.cell.gripper.model, reach.grasp).opening / 2
+    hand = {station.holder.name: reach.q_at, station.hand: np.full(2, jaws)}
+    return all(ways_above(station, bolt, hand) for bolt in bolts)
 
 
 def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]:
