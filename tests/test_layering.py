@@ -60,9 +60,6 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "speed": {"reporting", "assembly"},
         "paper": {"reporting", "campaigns", "speed"},
         "cli": {"reporting", "plan", "assembly", "campaigns", "paper", "product"},
-        "speed": {"reporting", "assembly"},
-        "paper": {"reporting", "campaigns", "speed"},
-        "cli": {"reporting", "plan", "assembly", "campaigns", "paper", "product"},
     },
 }  # fmt: skip
 EVERYWHERE = {
