@@ -1,4 +1,4 @@
-"""Where the models are, from a source tree and from an installed wheel alike."""
+"""Where models are: those of the package, and those beside a product file of a user's own."""
 
 from __future__ import annotations
 
@@ -10,14 +10,31 @@ from pydrake.multibody.plant import MultibodyPlant
 from cell.errors import UnknownName
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
+FILE_URL = "file://"
 
 
-def new_parser(plant: MultibodyPlant) -> Parser:
-    """Return a parser that resolves ``package://soft_jig_models/...`` and renames duplicates."""
+def new_parser(plant: MultibodyPlant, model: str = "") -> Parser:
+    """Return a parser that resolves ``package://soft_jig_models/...`` and renames duplicates.
+
+    Args:
+        plant: Not finalized yet.
+        model: What is to be parsed, as `model_url` takes it: a file may refer to the package that
+            it lies in, which is that of the nearest ``package.xml`` above it.
+    """
     parser = Parser(plant)
     parser.package_map().AddPackageXml(str(MODELS / "package.xml"))
+    if model.startswith(FILE_URL):
+        own = package_above(Path(model.removeprefix(FILE_URL)))
+        if own is not None and own != MODELS / "package.xml":
+            parser.package_map().AddPackageXml(str(own))
     parser.SetAutoRenaming(True)
     return parser
+
+
+def package_above(file: Path) -> Path | None:
+    """Return the nearest ``package.xml`` in the folders above a file; None if there is none."""
+    found = (folder / "package.xml" for folder in file.resolve().parents)
+    return next((candidate for candidate in found if candidate.is_file()), None)
 
 
 def model_url(name: str) -> str:
@@ -28,13 +45,17 @@ def model_url(name: str) -> str:
     return name if "://" in name else f"package://soft_jig_models/sdf/{name}/{name}.sdf"
 
 
+def model_names() -> list[str]:
+    """Return the names of the models of the package."""
+    return sorted(file.stem for file in (MODELS / "sdf").glob("*/*.sdf"))
+
+
 def model_folder(name: str) -> Path:
-    """Return the folder of an SDF model that a product names: ``models/sdf/<name>``.
+    """Return the folder of an SDF model of the package: ``models/sdf/<name>``.
 
     Raises:
         UnknownName: There is no such model.
     """
-    known = [file.stem for file in (MODELS / "sdf").glob("*/*.sdf")]
-    if name not in known:
-        raise UnknownName("model", name, known)
+    if name not in model_names():
+        raise UnknownName("model", name, model_names())
     return MODELS / "sdf" / name

@@ -14,7 +14,6 @@ from pydrake.systems.framework import Context
 
 from cell.configuration.config import CellConfig
 from cell.errors import BadOrder, InputError
-from cell.products.joints import Fit
 from cell.products.loading import load_product
 from cell.products.product import Product
 from cell.simulation.phase import Outcome, Phase, after
@@ -28,10 +27,10 @@ from experiments.assembly.prepare import Disturbance, RunningCell
 from experiments.assembly.resume import go_on, resumable_state
 from experiments.assembly.run import Run, StepResult
 from planning.assembly_plan.planner import plan
+from planning.operations import mating as mating_phases
 from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import INSERT_SHAFT
-from planning.operations.insert_shaft import phases as insert_phases
-from planning.operations.insert_shaft.phases import goal_pose
+from planning.operations.mating import Mating, goal_pose
 from planning.operations.operation import Step, StepRecord
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.pick_place.phases import PlacePhase
@@ -363,10 +362,10 @@ def test_search_finds_a_shaft_that_is_not_where_the_sensor_says(
 ) -> None:
     """3 mm are beyond what the edge breaks catch (1 mm) and the soft hand yields (about 1 mm)."""
 
-    def misplaced(station: Station, fit: Fit) -> RigidTransform:
-        return RigidTransform([3e-3, 0.0, 0.0]) @ goal_pose(station, fit)
+    def misplaced(station: Station, mating: Mating) -> RigidTransform:
+        return RigidTransform([3e-3, 0.0, 0.0]) @ goal_pose(station, mating)
 
-    monkeypatch.setattr(insert_phases, "goal_pose", misplaced)
+    monkeypatch.setattr(mating_phases, "goal_pose", misplaced)
     arguments = ["--start", str(placed / "state.npz"), "--quiet", "--out", str(tmp_path)]
     assert shaft_insertion.main(arguments) == 0
     measured = result_in(tmp_path)["steps"][-1]["measured"]

@@ -118,7 +118,7 @@ def test_quiet_prints_nothing(
 @pytest.mark.parametrize(
     ("line", "message"),
     [
-        ("", "A command is missing. Known: plan, assemble, place, push, regress, sweep."),
+        ("", "A command is missing. Known: plan, assemble, init, check, place, push, regress,"),
         ("asemble", "No command 'asemble'. Did you mean 'assemble'? Known: assemble,"),
         ("plan", "Missing from soft-jig plan: PRODUCT"),
         ("plan a b", "Unrecognized options: b"),

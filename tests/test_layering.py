@@ -47,6 +47,8 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "motion": set(),
         "perception": set(),
         "operations": {"feasibility", "motion", "assembly_plan", "perception"},
+        "product_draft": {"feasibility", "assembly_plan"},
+        "product_check": {"assembly_plan", "fixture_analysis", "motion", "operations"},
     },
     "experiments": {
         "reporting": set(),
@@ -54,10 +56,11 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "plan": {"reporting"},
         "assembly": {"reporting"},
         "campaigns": {"reporting", "assembly"},
+        "product": {"reporting", "assembly"},
         "speed": {"reporting", "assembly"},
         "vision": set(),
         "paper": {"reporting", "campaigns", "speed"},
-        "cli": {"reporting", "plan", "assembly", "campaigns", "paper"},
+        "cli": {"reporting", "plan", "assembly", "campaigns", "paper", "product"},
     },
 }  # fmt: skip
 EVERYWHERE = {

@@ -13,8 +13,9 @@ from cell.products.loading import load_product
 from planning.operations.bolts import in_hole, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
-from planning.operations.insert_shaft.measures import riders_standing, seat_errors
+from planning.operations.insert_shaft.phases import mating_of
 from planning.operations.log_rows import rows_between
+from planning.operations.mating_measures import riders_standing, seat_errors
 from planning.operations.measures import force_plate_peaks, moved
 from planning.operations.operation import PhaseRecord, Step, StepRecord
 from planning.operations.pick_place.measures import placement_errors
@@ -32,6 +33,7 @@ from planning.operations.tighten_bolts.measures import (
 from planning.operations.tighten_bolts.phases import DrivePhase
 
 PRODUCT = load_product("motor_unit")
+SEATED = mating_of(PRODUCT, Step("insert plate", INSERT_SHAFT, ("plate",), PRODUCT.fits[0]))
 BOLT = PRODUCT.screws["bolt_1"]
 CELL = cast(Cell, SimpleNamespace(product=PRODUCT, holder=SimpleNamespace(name="left")))
 
@@ -60,13 +62,13 @@ def moved_part(state: Snapshot, part: str, X: RigidTransform) -> Snapshot:
 
 
 def test_assembled_product_has_no_gap_and_no_tilt() -> None:
-    assert seat_errors(PRODUCT, PRODUCT.fits[0], snapshot()) == pytest.approx((0, 0), abs=1e-9)
+    assert seat_errors(PRODUCT, SEATED, snapshot()) == pytest.approx((0, 0, 0), abs=1e-9)
 
 
 def test_gap_is_along_the_axis_and_at_the_hole() -> None:
     """A plate that is lifted by 0.3 mm, shifted and turned about the axis has a gap of 0.3 mm."""
     X = RigidTransform(RollPitchYaw(0.0, 0.0, 0.2), [1e-3, -2e-3, 3e-4])
-    gap, tilt = seat_errors(PRODUCT, PRODUCT.fits[0], moved_part(snapshot(), "plate", X))
+    gap, tilt, aside = seat_errors(PRODUCT, SEATED, moved_part(snapshot(), "plate", X))
     assert gap == pytest.approx(3e-4)
     assert tilt == pytest.approx(0.0, abs=1e-7)
 
@@ -74,7 +76,7 @@ def test_gap_is_along_the_axis_and_at_the_hole() -> None:
 def test_tilt_counts_whatever_its_direction() -> None:
     for rpy in ([0.01, 0.0, 0.0], [0.0, -0.01, 0.0]):
         turned = RigidTransform(RollPitchYaw(rpy), np.zeros(3))
-        _, tilt = seat_errors(PRODUCT, PRODUCT.fits[0], moved_part(snapshot(), "plate", turned))
+        _, tilt, _ = seat_errors(PRODUCT, SEATED, moved_part(snapshot(), "plate", turned))
         assert tilt == pytest.approx(0.01)
 
 

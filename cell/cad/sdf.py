@@ -115,8 +115,15 @@ def mesh_inertia(mesh: trimesh.Trimesh, mass: float, name: str = "part") -> Iner
     return Inertia(mass, np.asarray(properties["center_mass"]), I_Cm_P)
 
 
-def write_model(folder: Path, model: Model) -> Path:
-    """Write ``folder/<name>/<name>.sdf`` and its meshes; return the path of the SDF."""
+def write_model(folder: Path, model: Model, source: str | None = None) -> Path:
+    """Write ``folder/<name>/<name>.sdf`` and its meshes; return the path of the SDF.
+
+    Args:
+        folder: For example ``models/sdf``.
+        model: What is written.
+        source: What wrote it, for a model of a user's own, which then refers to its meshes by
+            their names alone; None for a model of the package.
+    """
     home = folder / model.name
     home.mkdir(parents=True, exist_ok=True)
     for piece in model.pieces:
@@ -128,18 +135,22 @@ def write_model(folder: Path, model: Model) -> Path:
     if model.whole is not None:
         (home / f"{model.name}.obj").write_text(obj_text(model.whole))
     path = home / f"{model.name}.sdf"
-    path.write_text(sdf_text(model))
+    path.write_text(sdf_text(model, source))
     return path
 
 
-def sdf_text(model: Model) -> str:
-    """Return the SDF of a model whose meshes lie in ``models/sdf/<name>``."""
-    uri = f"package://soft_jig_models/sdf/{model.name}"
+def sdf_text(model: Model, source: str | None = None) -> str:
+    """Return the SDF of a model; the arguments are those of `write_model`."""
+    if source is None:
+        uri = f"package://soft_jig_models/sdf/{model.name}/"
+        remark = 'Written by "python -m cell.cad"; edit the source there.'
+    else:
+        uri, remark = "", f"Written by {source}; yours to edit. Lengths in m."
     body = [_inertial(model.inertia)]
     body += [_visual(visual, uri) for visual in model.visuals]
     body += [_collision(piece, uri) for piece in model.pieces]
     return (
-        '<?xml version="1.0"?>\n<!-- Written by "python -m cell.cad"; edit the source there. -->\n'
+        f'<?xml version="1.0"?>\n<!-- {remark} -->\n'
         '<sdf version="1.9" xmlns:drake="drake.mit.edu">\n'
         f'  <model name="{model.name}">\n    <link name="{LINK}">\n'
         + "".join(body)
@@ -168,7 +179,7 @@ def _inertial(inertia: Inertia) -> str:
 def _visual(visual: Visual, uri: str) -> str:
     """Return a visual element."""
     color = " ".join(f"{c:.3g}" for c in (*visual.color, 1.0))
-    mesh_uri = f"{uri}/{visual.name}_visual.obj"
+    mesh_uri = f"{uri}{visual.name}_visual.obj"
     return (
         f'      <visual name="{visual.name}">\n        <pose>{_pose(visual.X_PS)}</pose>\n'
         f"        <geometry>{_geometry(visual.shape, mesh_uri, False)}</geometry>\n"
@@ -178,7 +189,7 @@ def _visual(visual: Visual, uri: str) -> str:
 
 def _collision(piece: Piece, uri: str) -> str:
     """Return a collision element with its contact properties."""
-    mesh_uri = f"{uri}/{piece.name}_contact.obj"
+    mesh_uri = f"{uri}{piece.name}_contact.obj"
     return (
         f'      <collision name="{piece.name}">\n        <pose>{_pose(piece.X_PS)}</pose>\n'
         f"        <geometry>{_geometry(piece.shape, mesh_uri, piece.convex)}</geometry>\n"

@@ -24,6 +24,12 @@ FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
 FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 N_JOINTS = len(FLOAT_JOINTS) + 1
+TURNING = 0.85  # Share of the torque at which it stalls that a bolt still turns at [A].
+
+
+def largest_torque(seat_speed: float) -> float:
+    """Return the torque up to which the spindle tightens at a speed [rad/s], in N m [D]."""
+    return TURNING * SPINDLE_GAIN * seat_speed
 
 
 @dataclass(frozen=True)

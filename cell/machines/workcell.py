@@ -36,7 +36,7 @@ def add_workcell(plant: MultibodyPlant, config: CellConfig, tray: str | None) ->
     Args:
         plant: Not finalized yet.
         config: Where everything is, and whether the base is bolted down.
-        tray: Name of the tray's SDF model; None for no tray.
+        tray: Name or URL of the tray's SDF model; None for no tray.
     """
     X_WJ = config.workcell.X_WJ
     _add_static(plant, "table", RigidTransform())
@@ -55,6 +55,6 @@ def add_workcell(plant: MultibodyPlant, config: CellConfig, tray: str | None) ->
 
 def _add_static(plant: MultibodyPlant, model: str, X_WM: RigidTransform) -> WeldJoint:
     """Add a one-body model, welded: contact with ``world_body()`` itself crashes some plants."""
-    (instance,) = new_parser(plant).AddModelsFromUrl(model_url(model))
+    (instance,) = new_parser(plant, model).AddModelsFromUrl(model_url(model))
     body = plant.get_body(plant.GetBodyIndices(instance)[0])
     return plant.WeldFrames(plant.world_frame(), body.body_frame(), X_WM)

@@ -117,7 +117,7 @@ def _from_product_file(name_or_path: str | Path, options: ReadOptions) -> Produc
     if options.split or options.leave_out or options.depth is not None:
         what = "--split, --leave-out and --depth are for CAD"
         raise InputError(f"'{file.name}' lists its parts and groups itself; {what}.")
-    product = read_product(file)
+    product = read_product(file, outside=options.outside)
     repairs = {name: part.mesh.metadata.get(REPAIR, "") for name, part in product.parts.items()}
     sizes = _sizes({name: part.mesh for name, part in product.parts.items()})
     return replace(product, remarks=(*product.remarks, *sizes, *_repaired(repairs)))

@@ -43,7 +43,8 @@ class Part:
         mesh: Closed surface in P [m].
         mass: [kg].
         X_AP: Assembled pose in the product frame A.
-        model: Name of the SDF model in ``models/sdf``, or None for a part that is only planned.
+        model: Name of the SDF model in ``models/sdf``, or URL of one elsewhere; None for a part
+            that is only planned.
         X_TrayP: Pose in which the parts tray presents the part, in the tray's frame T (centre of
             its base plate's top face, +z up); None for a part that is only planned.
         grasps: Ways to hold it, best first.
@@ -85,7 +86,8 @@ class Product:
         contact_tolerance: Gap up to which two parts count as touching, and overlap up to which they
             do not block each other [m]; None to derive it from sizes and clearances.
         declared: What the user vouches for where the rule for rigid bodies would refuse it.
-        tray: Name of the SDF model of the tray that presents the parts; None if there is none.
+        tray: Name or URL of the SDF model of the tray that presents the parts; None if there is
+            none.
         remarks: What was assumed or repaired when it was read, one sentence each.
         left_out: What was in the input and is not planned.
     """

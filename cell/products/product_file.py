@@ -6,17 +6,16 @@ from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 import yaml
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell.errors import BadOrder, BadPart, InputError
-from cell.paths import model_folder
 from cell.products.fields import Fields, mapping_at, names_at, one_of
 from cell.products.joints import read_joints
 from cell.products.mesh_io import LARGEST_PART, load_mesh
+from cell.products.model_files import find_model
 from cell.products.product import Grasp, Part, Product
 
 PRODUCT_KEYS = (
@@ -42,8 +41,12 @@ JAWS = ("tip", "wide", "nose")
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
-def read_product(file: Path) -> Product:
+def read_product(file: Path, *, outside: bool = False) -> Product:
     """Return the product that a YAML file describes.
+
+    Args:
+        file: The YAML file.
+        outside: Whether models may lie outside of its folder; see `find_model`.
 
     Raises:
         InputError: Or one of its children, with the place in the file.
@@ -55,7 +58,9 @@ def read_product(file: Path) -> Product:
     fields = Fields(data, file.name, PRODUCT_KEYS)
     units = fields.text("units", "mm")
     parts = {
-        name: _part(name, Fields(entry, fields.at(f"parts.{name}"), PART_KEYS), file.parent, units)
+        name: _part(
+            name, Fields(entry, fields.at(f"parts.{name}"), PART_KEYS), file, units, outside
+        )
         for name, entry in fields.mapping("parts").items()
     }
     if not parts:
@@ -70,7 +75,8 @@ def read_product(file: Path) -> Product:
         tolerance = fields.positive("contact_tolerance_mm") * 1e-3
         product = replace(product, contact_tolerance=tolerance)
     if "tray" in fields:
-        product = replace(product, tray=model_folder(fields.text("tray")).name)
+        tray = find_model(fields.text("tray"), file, outside=outside)
+        product = replace(product, tray=tray.model)
     # Joints and orders refer to parts and groups by name.
     joints = read_joints(fields.entries("joints"), product)
     return replace(product, joints=joints, orders=_orders(fields, product))
@@ -145,27 +151,29 @@ def _orders(fields: Fields, product: Product) -> tuple[tuple[str, ...], ...]:
     return orders
 
 
-def _part(name: str, fields: Fields, folder: Path, units: str) -> Part:
+def _part(name: str, fields: Fields, file: Path, units: str, outside: bool) -> Part:
     """Return one part; mesh and mass are those of its model, or stated in the file.
 
     Args:
         name: Of the part.
         fields: Its entry.
-        folder: Where the product file lies, and mesh files are looked up.
+        file: The product file, beside which models and meshes are looked up.
         units: Unit of mesh files.
+        outside: Whether models may lie outside of the product's folder.
     """
     if ("model" in fields) == ("mesh" in fields):
         raise BadPart(name, "it needs either a 'model' or a 'mesh' with a 'mass_kg'")
     if "model" in fields:
-        model = fields.text("model")
+        found = find_model(fields.text("model"), file, outside=outside)
+        model = found.model
         if "mass_kg" in fields:
-            raise BadPart(name, f"its mass comes from model '{model}': remove 'mass_kg'")
-        mesh = load_mesh(model_folder(model) / f"{model}.obj", name, "m")
-        sdf = ElementTree.parse(model_folder(model) / f"{model}.sdf").getroot()
-        mass = sum(float(element.text or "nan") for element in sdf.iter("mass"))
+            raise BadPart(
+                name, f"its mass comes from its model '{found.sdf.name}': remove 'mass_kg'"
+            )
+        mesh, mass = load_mesh(found.mesh, name, "m"), found.mass()
     else:
         model = None
-        mesh = load_mesh(folder / fields.text("mesh"), name, units)
+        mesh = load_mesh(file.parent / fields.text("mesh"), name, units)
         mass = fields.positive("mass_kg")
     return Part(
         name=name,

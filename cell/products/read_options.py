@@ -21,6 +21,7 @@ class ReadOptions:
             makes every part an item.
         tolerance: Gap up to which parts count as touching [m], if it is given: STEP is then
             tessellated as coarsely as it allows. None for finely.
+        outside: Whether a product file may use models outside of its folder.
     """
 
     units: str | None = None
@@ -30,3 +31,4 @@ class ReadOptions:
     leave_out: tuple[str, ...] = ()
     depth: int | None = None
     tolerance: float | None = None
+    outside: bool = False

@@ -49,7 +49,8 @@ def product_digest(product: Product) -> str:
     """Return a digest of what a product's file and meshes say about its parts and joints."""
     digest = hashlib.sha256(repr(product.joints).encode())
     for part in product.parts.values():
-        digest.update(f"{part.name} {part.mass} {part.model} {part.X_AP} {part.X_TrayP}".encode())
+        model = (part.model or "").rpartition("/")[2]  # The same wherever it lies.
+        digest.update(f"{part.name} {part.mass} {model} {part.X_AP} {part.X_TrayP}".encode())
         digest.update(np.ascontiguousarray(part.mesh.vertices).tobytes())
         digest.update(np.ascontiguousarray(part.mesh.faces).tobytes())
     return digest.hexdigest()[:16]

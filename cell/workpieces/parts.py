@@ -94,7 +94,7 @@ def add_parts(plant: MultibodyPlant, product: Product, X_WT: RigidTransform) -> 
     parts = {}
     for part in product.parts.values():
         if part.model is not None and part.X_TrayP is not None:
-            (instance,) = new_parser(plant).AddModelsFromUrl(model_url(part.model))
+            (instance,) = new_parser(plant, part.model).AddModelsFromUrl(model_url(part.model))
             taken = plant.GetModelInstanceName(instance) != part.name
             if taken and plant.HasModelInstanceNamed(part.name):
                 raise BadPart(part.name, "something else in the cell has this name")

@@ -21,7 +21,7 @@ class Assemble:
     """Plan, then run the whole assembly in the twin, with contact forces."""
 
     product: Annotated[Positional[str], arg(metavar="PRODUCT")] = "motor_unit"
-    """A name in models/products, or a YAML file."""
+    """A name in models/products, or a YAML file anywhere, with its models beside it."""
 
     order: Annotated[str | None, arg(metavar="A,B,C")] = None
     """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
@@ -31,6 +31,9 @@ class Assemble:
 
     start: Annotated[Path | None, arg(metavar="STATE.npz")] = None
     """Go on from state.npz or failed_state.npz of a run with the same product, order and seed."""
+
+    allow_outside: bool = False
+    """Let the product use models outside of the folder of its file."""
 
     view: bool = False
     """Show the run in a browser while it goes on."""
@@ -60,12 +63,13 @@ class Assemble:
                 if self.replay.is_dir() or not self.replay.name:
                     raise BadUsage(f"--replay {self.replay}: it is a folder, not a file.")
             from cell.products.loading import load_product, require_product_file
+            from cell.products.read_options import ReadOptions
             from experiments.assembly.assemble import run_job
             from experiments.assembly.job import Job
 
             require_product_file(self.product)
             job = Job(
-                product=load_product(self.product),
+                product=load_product(self.product, ReadOptions(outside=self.allow_outside)),
                 order=split_order(self.order),
                 config=config,
                 seed=self.common.seed,

@@ -18,8 +18,10 @@ from tyro.conf import FlagCreatePairsOff
 import cell
 from cell.errors import UnknownName
 from experiments.cli.assemble import Assemble
+from experiments.cli.check import Check
 from experiments.cli.common import BadUsage
 from experiments.cli.ending import exit_code
+from experiments.cli.init import Init
 from experiments.cli.paper import Place, Push, Regress
 from experiments.cli.plan import Plan
 from experiments.cli.sweep import Sweep
@@ -30,10 +32,12 @@ Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on s
 3: an error of the machine or of ours. 130, 143: interrupted; what was done is kept.
 --version prints the versions of the twin and of Drake.
 """
-Command = Plan | Assemble | Place | Push | Regress | Sweep
+Command = Plan | Assemble | Init | Check | Place | Push | Regress | Sweep
 COMMANDS: dict[str, type[Command]] = {
     "plan": Plan,
     "assemble": Assemble,
+    "init": Init,
+    "check": Check,
     "place": Place,
     "push": Push,
     "regress": Regress,

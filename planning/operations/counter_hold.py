@@ -13,7 +13,6 @@ from cell.simulation.phase import Command, Outcome, Phase, motion_finished
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import (
     Reach,
-    first,
     grip,
     opened,
     reachable_grasps,
@@ -49,13 +48,26 @@ class HoldPhase(Enum):
     PARK = "park"
 
 
-def hold(station: Station, part: str, meanwhile: Meanwhile) -> Generator[Phase, Outcome, Grasp]:
+def hold(
+    station: Station, part: str, meanwhile: Meanwhile, suits: Callable[[Reach], bool]
+) -> Generator[Phase, Outcome, Grasp | None]:
     """Yield the phases with which the hand grips an assembled part; return the grasp.
 
-    The belief about everything is fresh. `planning.operations.grasping.let_go` lets go of it.
+    Where no grasp from the side can be reached that suits the driver, the hand gets out of the way,
+    and the grasp is None: the fixture alone bears the torque. The belief about everything is fresh.
+    `planning.operations.grasping.let_go` lets go of the part.
+
+    Args:
+        station: The planner's view of the cell.
+        part: Name of the part.
+        meanwhile: What the driver does beside it.
+        suits: Whether the driver reaches the bolts beside the hand.
     """
     arm, gripper = station.holder, station.cell.gripper
-    reach = first(_from_the_side(station, part), part, station)
+    reach = next(filter(suits, from_the_side(station, part)), None)
+    if reach is None:
+        yield from park(station, meanwhile)
+        return None
     motion = station.move(arm, reach.q_before, [(station.hand, part)])
     jaw = opened(gripper.model, reach.grasp)
     yield Phase(
@@ -81,7 +93,7 @@ def hold(station: Station, part: str, meanwhile: Meanwhile) -> Generator[Phase, 
     return reach.grasp
 
 
-def _from_the_side(station: Station, part: str) -> Iterator[Reach]:
+def from_the_side(station: Station, part: str) -> Iterator[Reach]:
     """Yield grasps that leave the space above the part to the driver."""
     X_WP = station.pose_of(part)
     grasps = [

@@ -156,6 +156,11 @@ class StepRecord:
         return max(ends, key=lambda end: end.time, default=None)
 
 
+def foresees_nothing(station: Station, step: Step) -> tuple[str, ...]:
+    """Return no remarks: the operation has no place in an assembly."""
+    return ()
+
+
 def plans_nothing(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
     """Offer no step: the operation has no place in an assembly plan."""
     return None
@@ -183,6 +188,8 @@ class Operation:
         plan: Returns the step that the operation can take in a scene, with these parts (of
             `Role.FINISH`: with none given) and with riders on them; None where it is not meant for
             them. Raises `NoOperation` where it is meant for them and something is missing.
+        foresee: Without simulating, makes the choices of a step and believes that it succeeds;
+            returns what is worth knowing. Raises `Unreachable` where the arms cannot do it.
     """
 
     name: str
@@ -194,3 +201,4 @@ class Operation:
     joint: type[Joint] | None = None
     coarse: bool = False
     plan: Callable[[Scene, tuple[str, ...], tuple[str, ...]], Step | None] = plans_nothing
+    foresee: Callable[[Station, Step], tuple[str, ...]] = foresees_nothing

@@ -12,7 +12,9 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.machines.arm import Unreachable
-from planning.feasibility.directions import rotation_with_up
+from cell.products.joints import Fit, Rest
+from cell.products.product import Product
+from planning.feasibility.directions import rotation_with_up, unit_vector
 from planning.motion.paths import NoPath, plan_line
 from planning.operations.grasping import Reach, backed_off
 from planning.operations.station import Placement, Station
@@ -29,6 +31,27 @@ Suits = Callable[[RigidTransform], bool]  # Of a pose X_WP on the fixture.
 def anywhere(X_WP: RigidTransform) -> bool:
     """Suit every pose of the part on the fixture."""
     return True
+
+
+def enters_from_above(product: Product, fit: Fit) -> bool:
+    """Return whether a shaft comes down into its hole: its part is above the mouth, mostly."""
+    up, shaft = unit_vector(product.up), product.parts[fit.shaft]
+    p_AoG = shaft.X_AP @ np.asarray(shaft.mesh.center_mass, float)
+    return bool(up @ (p_AoG - fit.p_AoF) > 0.0)
+
+
+def brought_to(product: Product, part: str) -> tuple[str, ...]:
+    """Return the names of the parts that come to a part from above, but for bolts."""
+    found = []
+    for joint in product.joints:
+        if isinstance(joint, Rest) and joint.on == part:
+            found.append(joint.part)
+        elif isinstance(joint, Fit):
+            if joint.shaft == part and not enters_from_above(product, joint):
+                found.append(joint.hole)
+            elif joint.hole == part and enters_from_above(product, joint):
+                found.append(joint.shaft)
+    return tuple(found)
 
 
 def upright(up: str, yaw: float) -> RotationMatrix:

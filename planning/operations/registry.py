@@ -8,6 +8,7 @@ from planning.operations.operation import Operation
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.place_bolts import PLACE_BOLTS, PLACE_LOOSE_BOLTS
 from planning.operations.push import PUSH
+from planning.operations.rest import REST
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 
@@ -20,6 +21,7 @@ OPERATIONS: dict[str, Operation] = {
         PLACE_BOLTS,
         PLACE_LOOSE_BOLTS,
         INSERT_SHAFT,
+        REST,
         TIGHTEN_BOLTS,
         PUSH,
     )

@@ -32,6 +32,11 @@ def steps(product: Product, plan: FixingPlan) -> list[Step]:
             raise NoOperation(
                 f"{planned.item} is added along {way}; no operation comes at an angle."
             )
+        if planned.posture[-1:] != product.up[-1]:
+            raise NoOperation(
+                f"{planned.item} leaves along {planned.posture}, and up is {product.up}: no "
+                "operation comes from the side."
+            )
     sequence = _Sequence(Scene(product))
     for planned in plan.steps:
         sequence.add(planned)

@@ -144,6 +144,10 @@ class Belief:
         for name in self.carried.keys() & seen.keys():
             self.carried[name] = self.hand()
 
+    def suppose(self, part: str, X_WP: RigidTransform) -> None:
+        """Believe a part to be at a pose without having looked."""
+        self.estimates[part] = Estimate(X_WP, np.zeros((6, 6)), 0.0)
+
     def pose(self, part: str) -> RigidTransform:
         """Return the believed pose X_WP of a part now.
 

@@ -65,6 +65,7 @@ class ArmModel:
         stiffness: Of each joint's position drive [N m/rad].
         damping: Of each joint's position drive [N m s/rad].
         home_deg: Joint angles to wait in [deg], for a "gripper" and for a "driver" on the flange.
+        payload: Largest mass at the flange, tool and part together [kg].
         flange_z: How far the flange is in front of the last link's frame, along its z [m].
         joint_damping: Friction of every joint [N m s/rad] [A]: under 2 N m at full speed.
         rotor_inertia, gear_ratio: Of every joint's motor [kg m2], [-]; reflected 0.1 kg m2 [A], the
@@ -77,6 +78,7 @@ class ArmModel:
     stiffness: tuple[float, ...]
     damping: tuple[float, ...]
     home_deg: Mapping[str, tuple[float, ...]]
+    payload: float = np.inf
     flange_z: float = 0.0
     joint_damping: float = 0.5
     rotor_inertia: float = 1e-5

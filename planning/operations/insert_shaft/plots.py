@@ -5,17 +5,19 @@ from __future__ import annotations
 import numpy as np
 
 from cell.builder import Cell
-from planning.operations.insert_shaft.measures import fit_of, insertion_curve
-from planning.operations.insert_shaft.phases import SOFT
+from planning.operations.insert_shaft.phases import mating_of
+from planning.operations.mating import SOFT
+from planning.operations.mating_measures import insertion_curve
 from planning.operations.operation import Arrays, StepRecord
 from planning.operations.plot import Plot
 
 
 def plots(cell: Cell, record: StepRecord, log: Arrays) -> list[Plot]:
     """Return the force along and across the axis, with the force at which the arm yields."""
-    if not record.of(fit_of(record).hole, *SOFT):
+    mating = mating_of(cell.product, record.step)
+    if not record.of(mating.part, *SOFT):
         return []
-    depth, force = insertion_curve(cell, record, log)
+    depth, force = insertion_curve(cell, record, log, mating)
     curves = {
         "axial": (1e3 * depth, np.abs(force[:, 2])),
         "lateral": (1e3 * depth, np.hypot(force[:, 0], force[:, 1])),

@@ -3,7 +3,7 @@
 from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.pick_place.limits import LIMITS
 from planning.operations.pick_place.measures import measure
-from planning.operations.pick_place.phases import carry_out
+from planning.operations.pick_place.phases import carry_out, foresee
 
 
 def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
@@ -19,4 +19,5 @@ PICK_PLACE = Operation(
     limits=LIMITS,
     role=Role.FIX,
     plan=plan,
+    foresee=foresee,
 )

@@ -26,11 +26,14 @@ from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.placement import (
     HOVER,
+    LIKELY_DEPTH,
     RETREAT,
     Placement,
     Suits,
     anywhere,
+    brought_to,
     choose_placement,
+    pose_on_jig,
 )
 from planning.operations.station import FIXTURE, Station
 from planning.operations.waiting import steady_wrist
@@ -61,9 +64,20 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     """Yield the phases of a step: the part upright, and so that later parts can be brought."""
     (part,) = step.parts
     product = station.cell.product
-    later = tuple(fit.hole for fit in product.fits if fit.shaft == part)
-    yield from pick_place(station, part, product.up, later)
+    yield from pick_place(station, part, product.up, brought_to(product, part))
     yield from look(station, PlacePhase.LOOK_AGAIN, part)
+
+
+def foresee(station: Station, step: Step) -> tuple[str, ...]:
+    """Choose grasp and place of a part, and believe it to stand there."""
+    (part,) = step.parts
+    product = station.cell.product
+    _, placement = _choose(station, part, product.up, brought_to(product, part), anywhere)
+    height = station.cell.fixture.entry_height - LIKELY_DEPTH
+    seated = pose_on_jig(station, part, product.up, placement.yaw, height)
+    station.origins[part] = station.pose_of(part)
+    station.belief.suppose(part, seated)
+    return ()
 
 
 def pick_place(

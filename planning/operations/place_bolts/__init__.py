@@ -7,7 +7,7 @@ from cell.products.joints import Screw
 from planning.operations.operation import NoOperation, Operation, Role, Scene, Step
 from planning.operations.place_bolts.limits import LIMITS, LOOSE_LIMITS
 from planning.operations.place_bolts.measures import measure, measure_loose
-from planning.operations.place_bolts.phases import carry_out
+from planning.operations.place_bolts.phases import carry_out, foresee
 
 
 def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
@@ -53,6 +53,7 @@ PLACE_BOLTS = Operation(
     joint=Screw,
     coarse=True,
     plan=plan,
+    foresee=foresee,
 )
 PLACE_LOOSE_BOLTS = Operation(
     name="place_loose_bolts",
@@ -63,4 +64,5 @@ PLACE_LOOSE_BOLTS = Operation(
     joint=Screw,
     coarse=True,
     plan=plan_loose,
+    foresee=foresee,
 )

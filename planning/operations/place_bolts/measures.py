@@ -21,7 +21,7 @@ def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:
             screw = cell.product.screws[bolt]
             of_bolt = standing(screw, record.end.X_HF[bolt])
             near = [phase.end for phase in record.of(bolt, BoltPhase.LOWER, HandPhase.RELEASE)]
-            clearance = min(snapshot.hand_clearance[screw.into] for snapshot in near)
+            clearance = min(snapshot.hand_clearance.get(screw.into, np.inf) for snapshot in near)
             if np.isfinite(clearance):
                 of_bolt["hand_clearance_m"] = clearance
             measured |= named_of(bolt, of_bolt)

@@ -31,8 +31,8 @@ from planning.operations.waiting import steady_wrist
 LOOK_TIME = 0.05  # The bolt comes to rest in the tray [s] [A].
 LIFT = 0.06
 CLEAR_ABOVE = 0.045  # Transfers end this far above where the bolt will stand [m] [A].
-ABOVE = 0.012  # The bolt is looked at once more this far above, its tip over the hole [m] [A].
-ENTRY = 0.006  # From here on the shank can touch the clamped part [m] [D].
+ABOVE = 0.006  # The bolt is looked at once more this far above the clamped part [m] [A].
+ENTRY = 0.001  # Kept between its tip and the clamped part [m] [A].
 TOUCH_FORCE = 1.5  # The bolt stands when it pushes back this hard [N] [A].
 SLOW = 0.04  # At most, down to the seat [m/s] [A].
 RETREAT = 0.05
@@ -58,6 +58,14 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         yield from place_bolt(station, bolt)
 
 
+def foresee(station: Station, step: Step) -> tuple[str, ...]:
+    """Choose the grasp of every bolt, and believe it to stand in its hole."""
+    for bolt in step.parts:
+        _grasp_for_hole(station, bolt)
+        station.belief.suppose(bolt, standing_pose(station, bolt))
+    return ()
+
+
 def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     """Yield the phases that stand a bolt in its hole.
 
@@ -70,7 +78,10 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     reach = _grasp_for_hole(station, bolt)
     yield from take(station, bolt, reach, LIFT)
     jaw, holding = arm.frame(reach.grasp.jaw), lost_grasp(station)
-    # Heights are those of a bolt that stands on the mouth of its thread.
+    # Heights are those of a bolt that stands on the mouth of its thread. From the lowest of them
+    # on, its shank can touch the clamped part.
+    length = -float(station.part(bolt).mesh.bounds[0][2])
+    entry = length - station.cell.product.screws[bolt].thread_depth + ENTRY
     X_WMouth, X_WStand = mouth_pose(station, bolt), standing_pose(station, bolt)
 
     def at(X_WP: RigidTransform) -> RigidTransform:
@@ -89,8 +100,8 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
         awake=held,
     )
     for look_kind, kind, height in (
-        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, ABOVE),
-        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, ENTRY),
+        (BoltPhase.LOOK_HIGH, BoltPhase.COME_DOWN, entry + ABOVE),
+        (BoltPhase.LOOK_LOW, BoltPhase.ALIGN, entry),
     ):
         yield from look(station, look_kind, bolt, [bolt], awake=held, guard=holding)
         line = station.line(arm, jaw, at(raised(X_WMouth, height)))

@@ -4,7 +4,7 @@ from cell.products.joints import Screw
 from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.tighten_bolts.limits import LIMITS
 from planning.operations.tighten_bolts.measures import measure
-from planning.operations.tighten_bolts.phases import carry_out
+from planning.operations.tighten_bolts.phases import carry_out, foresee
 from planning.operations.tighten_bolts.plots import plots
 
 
@@ -28,4 +28,5 @@ TIGHTEN_BOLTS = Operation(
     role=Role.FINISH,
     joint=Screw,
     plan=plan,
+    foresee=foresee,
 )

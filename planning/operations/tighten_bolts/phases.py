@@ -28,8 +28,8 @@ from cell.simulation.phase import (
 from cell.workpieces.thread import BIT_SEAT
 from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
-from planning.operations.counter_hold import Coming, hold, park
-from planning.operations.grasping import backed_off, let_go, raised
+from planning.operations.counter_hold import Coming, from_the_side, hold, park
+from planning.operations.grasping import Reach, backed_off, let_go, opened, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
@@ -38,7 +38,7 @@ BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
 FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
 SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
-FEED_DEPTH = 0.008  # The feed can follow the bolt this far [m]: engaged length and reserve.
+FEED_RESERVE = 0.003  # The feed can follow the bolt this far beyond its engaged length [m] [A].
 FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
 FEED_LIMIT = 0.02  # [m/s] [A]
 STOP_TIME = 0.05  # Of the spindle [s] [A].
@@ -146,17 +146,44 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     def meanwhile(coming: Coming) -> dict[str, Command]:
         return come_beside(station, order[0], coming)
 
+    def leaves_room(reach: Reach) -> bool:
+        return _leaves_room(station, order, reach)
+
     if station.config.driver.counter_hold:
-        grasp = yield from hold(station, clamped, meanwhile)
+        grasp = yield from hold(station, clamped, meanwhile, leaves_room)
         for bolt in order:
             yield from tighten_bolt(station, bolt)
-        yield from let_go(station, clamped, grasp, RETREAT, assembly)
+        if grasp is not None:
+            yield from let_go(station, clamped, grasp, RETREAT, assembly)
     else:
         yield from park(station, meanwhile)
         for bolt in order:
             yield from tighten_bolt(station, bolt)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
     yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
+
+
+def foresee(station: Station, step: Step) -> tuple[str, ...]:
+    """See whether the driver reaches every bolt, beside the hand that holds against it."""
+    clamped = station.cell.product.screws[step.parts[0]].clamps
+    away = {station.holder.name: station.holder.home}
+    for bolt in step.parts:
+        if not ways_above(station, bolt, away):
+            _above(station, bolt, away)  # Raises what is said of it.
+    if not station.config.driver.counter_hold:
+        return ()
+    for reach in from_the_side(station, clamped):
+        if _leaves_room(station, step.parts, reach):
+            return ()
+    alone = "leaves room for the driver: the jig alone bears the torque"
+    return (f"no grasp of '{clamped}' from the side {alone}",)
+
+
+def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
+    """Return whether the driver reaches bolts while the hand holds what they clamp."""
+    jaws = opened(station.cell.gripper.model, reach.grasp).opening / 2
+    hand = {station.holder.name: reach.q_at, station.hand: np.full(2, jaws)}
+    return all(ways_above(station, bolt, hand) for bolt in bolts)
 
 
 def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]:
@@ -203,11 +230,10 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     # known from then on, wherever it was seen to stand.
     bit = driver.frame("bit_tip")
     mouth = outcome.sensed.X_WF(bit).translation()[2]
-    down = raised(station.tool_pose(driver, "tool_tip"), -FEED_DEPTH)
+    depth = screw.thread_depth + FEED_RESERVE
+    down = raised(station.tool_pose(driver, "tool_tip"), -depth)
     line = station.line(driver, tip, down, speed=FEED_LIMIT)
-    feed = Follow(
-        Feed(spindle, line, FEED_DEPTH, config.driver.push_force, config.simulation.time_step)
-    )
+    feed = Follow(Feed(spindle, line, depth, config.driver.push_force, config.simulation.time_step))
 
     def nearly_seated(sensed: Sensed) -> bool:
         sunk = mouth - sensed.X_WF(bit).translation()[2]
@@ -242,7 +268,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         awake=awake,
         mating=mating,
     )
-    off = backed_off(station.tool_pose(driver, "tool_tip"), BIT_HOVER + FEED_DEPTH)
+    off = backed_off(station.tool_pose(driver, "tool_tip"), BIT_HOVER + depth)
     yield Phase(
         DrivePhase.DRIVER_OFF,
         motion_finished,
@@ -272,15 +298,30 @@ def _holding(station: Station) -> list[tuple[str, str]]:
 def _above(
     station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
 ) -> np.ndarray:
-    """Return the nearest configuration (n,) over a bolt's head, turned any way about its axis.
+    """Return the nearest configuration (n,) over a bolt's head; the arguments: `ways_above`.
+
+    Raises:
+        Unreachable: There is none.
+    """
+    driver = station.driver
+    near = driver.positions(station.context)
+    found = ways_above(station, bolt, elsewhere)
+    if not found:
+        X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
+        reason = "no turn of the driver keeps clear there"
+        raise Unreachable(driver.name, "tool_tip", X_WE, reason)
+    return min(found, key=lambda q: float(np.max(np.abs(q - near))))
+
+
+def ways_above(
+    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
+) -> list[np.ndarray]:
+    """Return configurations (n,) over a bolt's head, turned any way about its axis.
 
     Args:
         station: The planner's view of the cell.
         bolt: Name of the bolt.
         elsewhere: See `Station.surroundings`.
-
-    Raises:
-        Unreachable: There is none.
     """
     driver, holding = station.driver, _holding(station)
     tip, near = driver.frame("tool_tip"), driver.positions(station.context)
@@ -289,10 +330,7 @@ def _above(
     for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
         X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
         found += station.configurations(driver, tip, X, near, holding, FINE_CLEARANCE, elsewhere)
-    if not found:
-        reason = "no turn of the driver keeps clear there"
-        raise Unreachable(driver.name, tip.name(), X_WE, reason)
-    return min(found, key=lambda q: float(np.max(np.abs(q - near))))
+    return found
 
 
 def come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:

@@ -1,0 +1,53 @@
+"""Densities of materials by name [kg/m3]. [R] Typical values of material data sheets."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+from cell.errors import UnknownName
+
+DENSITIES: Mapping[str, float] = {
+    "abs": 1050.0,
+    "aluminium": 2700.0,
+    "brass": 8500.0,
+    "bronze": 8800.0,
+    "cast iron": 7200.0,
+    "copper": 8960.0,
+    "nylon": 1140.0,
+    "peek": 1320.0,
+    "petg": 1270.0,
+    "pla": 1240.0,
+    "pmma": 1190.0,
+    "polycarbonate": 1200.0,
+    "pom": 1410.0,
+    "ptfe": 2200.0,
+    "stainless steel": 7900.0,
+    "steel": 7850.0,
+    "titanium": 4430.0,
+    "zinc": 7140.0,
+}
+ALIASES: Mapping[str, str] = {"aluminum": "aluminium", "stainless": "stainless steel"}
+
+DEFAULT_MATERIAL = "aluminium"
+FASTENER_MATERIAL = "steel"
+
+
+def material_named(name: str) -> str:
+    """Return a material's own name, in whatever case and spelling it was given.
+
+    Raises:
+        UnknownName: There is none of that name.
+    """
+    plain = " ".join(name.lower().replace("_", " ").split())
+    plain = ALIASES.get(plain, plain)
+    if plain not in DENSITIES:
+        raise UnknownName("material", name, DENSITIES)
+    return plain
+
+
+def material_in(part: str) -> str | None:
+    """Return the material that a part's name contains, such as "brass_bush"; None for none."""
+    plain = part.lower().replace("_", " ").replace("-", " ")
+    known = [*DENSITIES, *ALIASES]
+    found = [name for name in known if f" {name} " in f" {plain} "]
+    return material_named(max(found, key=len)) if found else None

@@ -1,0 +1,40 @@
+"""``soft-jig check``: what would fail, one line each."""
+
+from __future__ import annotations
+
+import time
+
+from rich.console import Console
+
+from cell.configuration.config import CellConfig
+from cell.products.product import Product
+from experiments.assembly.prepare import RunningCell
+from planning.product_check.check import machine_findings, plan_findings, simulated_findings
+from planning.product_check.finding import Level
+
+
+def run_check(
+    product: Product, order: tuple[str, ...] | None, config: CellConfig, seed: int, *, quiet: bool
+) -> int:
+    """Print what was found, the worst last; return 0 if nothing fails, else 1.
+
+    Raises:
+        InputError: The product cannot be simulated at all, or the order is malformed.
+    """
+    started = time.perf_counter()
+    console = Console(quiet=quiet, highlight=False)
+    product.check_simulable()
+    found = list(machine_findings(product, config))
+    planned, todo = plan_findings(product, order, config)
+    found += planned
+    running = RunningCell(product, config, seed)
+    found += simulated_findings(running.simulation, running.station, todo)
+    levels = list(Level)
+    for finding in sorted(found, key=lambda finding: levels.index(finding.level)):
+        console.print(str(finding), markup=False, soft_wrap=True)
+    bad = sum(finding.level is Level.FAILS for finding in found)
+    doubts = sum(finding.level is Level.DOUBTFUL for finding in found)
+    seconds = time.perf_counter() - started
+    verdict = f"{bad} would fail" if bad else "nothing would fail that can be seen without running"
+    console.print(f"{product.name}: {verdict}, {doubts} doubtful; {seconds:.1f} s", markup=False)
+    return 1 if bad else 0

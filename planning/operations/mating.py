@@ -1,0 +1,300 @@
+"""The phases that bring a part from above to one on the fixture, until it is seated.
+
+The hand carries the part over its place, then goes soft: an impedance centred where the parts meet
+lets it comply sideways and tilt, pushes with a limited force, and searches on a spiral if a shaft
+has not found its hole. It ends when the part stands still; whether it is seated is measured, not
+assumed.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+from pydrake.math import RigidTransform
+from pydrake.multibody.tree import Frame
+
+from cell.configuration.config import InsertionConfig
+from cell.simulation.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
+from planning.operations.grasping import (
+    Reach,
+    comes_from_above,
+    first,
+    jaw_to_part,
+    let_go,
+    lost_grasp,
+    opened,
+    raised,
+    reachable_grasps,
+    take,
+)
+from planning.operations.look import look
+from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.waiting import Steady, steady_wrist
+
+LIFT = 0.12
+ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].
+NEAR = 0.002  # The hand goes soft this far before shaft and hole can meet [m] [A].
+LANDING = 0.001  # Slow from this far above the seat to this far below it [m] [A].
+BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand presses [m] [A].
+RETREAT = 0.08
+STALL_TIME = 0.25
+STALLED = 1.25e-4  # What moves less than this in the stall time stands: 0.5 mm/s [m].
+PATIENCE = 5.0  # For coming to a stand under the whole force [s] [A].
+YAW_STIFFNESS = 40.0  # About the axis of the hole; the bolt holes must meet [N m/rad] [A].
+LATERAL_LIMIT = 15.0  # [N] [A]
+TORQUE_LIMIT = 1.0  # [N m] [A]
+TOO_MUCH = 30.0  # Insertion fails above this force [N].
+
+Target = Callable[[float], RigidTransform]  # X_WD of the compliance centre over time [s].
+
+
+@dataclass(frozen=True)
+class Mating:
+    """What is brought to what.
+
+    Attributes:
+        part: Name of the part in the hand.
+        on: Name of the part on the fixture.
+        p_AoC: Compliance centre C, in the product frame A [m]: the mouth of the hole in the hand,
+            the tip of the shaft in the hand, or the middle of the face that comes to rest.
+        depth: How far before its seat a shaft meets its hole [m]; 0: nothing guides the part.
+        axis: (3,) direction out of the seat, in A.
+    """
+
+    part: str
+    on: str
+    p_AoC: np.ndarray
+    depth: float
+    axis: np.ndarray
+
+
+class MatePhase(Enum):
+    """What comes besides taking the part and letting it go."""
+
+    LOOK = "look"
+    TRANSFER = "transfer"
+    LOOK_OVER_SHAFT = "look over the shaft"
+    ALIGN = "align"
+    HOVER = "hover"
+    INSERT = "insert"
+    SEARCH = "search"
+    INSERT_AGAIN = "insert again"
+    PRESS = "press"
+
+
+# Those in which the hand is soft, in their order.
+SOFT = (MatePhase.INSERT, MatePhase.SEARCH, MatePhase.INSERT_AGAIN, MatePhase.PRESS)
+
+
+def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iterator[Phase]:
+    """Yield the phases that bring a part to its seat and let it go.
+
+    Bolts that ride in its holes reach beyond its underside: they come to stand on the mouths of
+    their threads, and their heads stay behind as the part sinks to its seat.
+    """
+    arm, part = station.holder, mating.part
+    held = frozenset([part, *riders])
+    both = held | {mating.on}
+    yield from look(station, MatePhase.LOOK, part)
+    X_WGoal = goal_pose(station, mating)
+    reach = first(useful_grasps(station, mating, X_WGoal), part, station)
+    yield from take(station, part, reach, LIFT, riders)
+    jaw, holding = arm.frame(reach.grasp.jaw), lost_grasp(station)
+    above = raised(X_WGoal, ABOVE) @ jaw_to_part(station, part, reach.grasp).inverse()
+    q_above = station.configuration(arm, jaw, above, reach.q_before, [("held", "*")])
+    yield Phase(
+        MatePhase.TRANSFER,
+        motion_finished,
+        timeout=20.0,
+        subject=part,
+        commands={arm.name: station.move(arm, q_above)},
+        guard=holding,
+        awake=held,
+    )
+    # Once more with the part over its place: it may have turned in the grip on the way.
+    seen = (*station.in_hand, mating.on)
+    yield from look(station, MatePhase.LOOK_OVER_SHAFT, part, seen, awake=held, guard=holding)
+    X_JawP, X_WGoal = jaw_to_part(station, part, reach.grasp), goal_pose(station, mating)
+    near = raised(X_WGoal, mating.depth + NEAR) @ X_JawP.inverse()
+    yield Phase(
+        MatePhase.ALIGN,
+        motion_finished,
+        timeout=10.0,
+        subject=part,
+        commands={arm.name: station.line(arm, jaw, near)},
+        guard=holding,
+        awake=held,
+    )
+    # The wrist is tared at rest.
+    yield Phase(
+        MatePhase.HOVER, steady_wrist(arm.name), 1.0, subject=part, guard=holding, awake=held
+    )
+    yield from _insert(station, mating, X_WGoal, jaw, X_JawP, both)
+    yield from let_go(station, part, reach.grasp, RETREAT, both)
+
+
+def foresee_mating(station: Station, mating: Mating) -> None:
+    """Choose a grasp that fits where a part is taken and where it is put; believe it to be there.
+
+    Raises:
+        Unreachable: There is none.
+    """
+    X_WGoal = goal_pose(station, mating)
+    first(useful_grasps(station, mating, X_WGoal), mating.part, station)
+    station.belief.suppose(mating.part, X_WGoal)
+
+
+def goal_pose(station: Station, mating: Mating) -> RigidTransform:
+    """Return the pose X_WP at which the part is seated, from what is believed."""
+    on, part = station.part(mating.on), station.part(mating.part)
+    return station.pose_of(mating.on) @ on.X_AP.inverse() @ part.X_AP
+
+
+def useful_grasps(station: Station, mating: Mating, X_WGoal: RigidTransform) -> Iterator[Reach]:
+    """Yield grasps of the part in the tray with which the hand also fits where it is seated."""
+    arm, part = station.holder, station.part(mating.part)
+    gripper = station.cell.gripper
+    for reach in reachable_grasps(station, part.name, station.pose_of(part.name), part.grasps):
+        frame = arm.frame(reach.grasp.jaw)
+        X_WAbove, X_WAt = (raised(X_WGoal, h) @ reach.grasp.X_PJaw for h in (ABOVE, 0.0))
+        may_touch = [(station.hand, part.name), ("held", "*")]
+        # Beside its seat the opened jaws come as close to the neighbours as they fit.
+        jaws = {station.hand: np.full(2, opened(gripper.model, reach.grasp).opening / 2)}
+        if (
+            comes_from_above(X_WGoal, reach.grasp.X_PJaw)
+            and station.configurations(arm, frame, X_WAbove, reach.q_before, may_touch)
+            and station.configurations(
+                arm, frame, X_WAt, reach.q_before, may_touch, FINE_CLEARANCE, jaws
+            )
+        ):
+            yield reach
+
+
+def _insert(
+    station: Station,
+    mating: Mating,
+    X_WGoal: RigidTransform,
+    jaw: Frame,
+    X_JawP: RigidTransform,
+    awake: frozenset[str],
+) -> Iterator[Phase]:
+    """Yield the soft phases: insert, search if it did not go in, press."""
+    config = station.config.insertion
+    # C: the compliance centre, with the axes of the part.
+    X_PC = RigidTransform(station.part(mating.part).X_AP.inverse() @ mating.p_AoC)
+    X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
+    arm, holding = station.holder.name, lost_grasp(station)
+
+    def guard(sensed: Sensed) -> str | None:
+        force = float(np.linalg.norm(sensed.wrench[arm][3:]))
+        too_much = f"insertion force {force:.1f} N" if force > TOO_MUCH else None
+        return holding(sensed) or too_much
+
+    def soft(
+        kind: MatePhase, force: float, target: Target, until: Condition, timeout: float
+    ) -> Phase:
+        return Phase(
+            kind,
+            until,
+            timeout=timeout,
+            subject=mating.part,
+            commands={arm: impedance(config, jaw, X_JawC, target, force)},
+            guard=guard,
+            awake=awake,
+            mating=frozenset([frozenset([mating.part, mating.on])]),
+            fine_log=True,
+            tare=kind is MatePhase.INSERT,
+        )
+
+    def height(sensed: Sensed) -> np.ndarray:
+        return (sensed.X_WF(jaw) @ X_JawC).translation()[2:]
+
+    def gap(outcome: Outcome) -> float:
+        return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
+
+    start = mating.depth + NEAR
+    descending = descent(X_WSeat, start, config, height)
+    outcome = yield soft(MatePhase.INSERT, config.force_limit, *descending)
+    if mating.depth > 0.0 and gap(outcome) > mating.depth / 2:
+        mouth = gap(outcome)
+        search = spiral(X_WSeat, mouth - BEYOND, config)
+
+        def found(sensed: Sensed) -> bool:
+            return height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3
+
+        length = config.search_radius**2 * np.pi / config.search_pitch
+        yield soft(
+            MatePhase.SEARCH, config.search_force, search, found, length / config.search_speed
+        )
+        again = descent(X_WSeat, mouth - 1e-3, config, height)
+        outcome = yield soft(MatePhase.INSERT_AGAIN, config.force_limit, *again)
+    # Where the part has found its place: a spring that still pulls sideways would wedge it there.
+    X_WC = RigidTransform(X_WSeat.rotation(), (outcome.sensed.X_WF(jaw) @ X_JawC).translation())
+    yield soft(MatePhase.PRESS, config.force_limit, *pressing(X_WC, height))
+
+
+def impedance(
+    config: InsertionConfig, jaw: Frame, X_JawC: RigidTransform, target: Target, force: float
+) -> Impedance:
+    """Return the impedance about the hole, with a limited downward force."""
+    turn, side = config.rotational_stiffness, config.lateral_stiffness
+    return Impedance(
+        jaw,
+        X_JawC,
+        target,
+        stiffness=np.array([turn, turn, YAW_STIFFNESS, side, side, side]),
+        limit=np.array([TORQUE_LIMIT] * 3 + [LATERAL_LIMIT, LATERAL_LIMIT, force]),
+    )
+
+
+def descent(
+    X_WSeat: RigidTransform,
+    start: float,
+    config: InsertionConfig,
+    height: Callable[[Sensed], np.ndarray],
+) -> tuple[Target, Condition, float]:
+    """Return target, end condition and time-out of a descent from ``start`` above the seat [m].
+
+    The target slows down around the seat, where metal meets metal, and then builds up the force.
+    Only what stands still under the whole force has come to its end: a part that leans on an edge
+    stands still before.
+    """
+    heights = [start, LANDING, -LANDING, -BEYOND]
+    speeds = [config.speed, config.landing_speed, config.speed]
+    times = np.cumsum([0.0, *(-np.diff(heights) / speeds)])
+    stalled = Steady(height, STALLED, STALL_TIME)
+
+    def target(t: float) -> RigidTransform:
+        return raised(X_WSeat, float(np.interp(t, times, heights)))
+
+    def until(sensed: Sensed) -> bool:
+        return stalled(sensed) and sensed.time >= times[-1] + STALL_TIME
+
+    return target, until, float(times[-1]) + PATIENCE
+
+
+def pressing(
+    X_WC: RigidTransform, height: Callable[[Sensed], np.ndarray]
+) -> tuple[Target, Condition, float]:
+    """Return target, end condition and time-out of a push straight down from where the part is."""
+    below = raised(X_WC, -BEYOND)
+    return lambda t: below, Steady(height, STALLED, STALL_TIME), PATIENCE
+
+
+def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:
+    """Return a target on an Archimedean spiral of constant speed about the axis of the hole.
+
+    With pitch p the arc length is s = p angle^2 / (4 pi), so the angle is sqrt(4 pi s / p).
+    """
+
+    def target(t: float) -> RigidTransform:
+        angle = np.sqrt(4 * np.pi * config.search_speed * t / config.search_pitch)
+        radius = config.search_pitch * angle / (2 * np.pi)
+        X = raised(X_WSeat, height)
+        offset = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
+        return RigidTransform(X.rotation(), X.translation() + offset)
+
+    return target

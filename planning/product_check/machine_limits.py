@@ -1,0 +1,92 @@
+"""What a product asks of hand, arm and driver against what those can give."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+from cell.configuration.config import CellConfig
+from cell.errors import UnknownName
+from cell.machines.arms import arm_model
+from cell.machines.driver import largest_torque
+from cell.machines.grippers import GRIPPER_MODELS, GripperModel
+from cell.products.product import Part, Product
+from planning.product_check.finding import Finding, doubtful, fails, good
+
+LEAST_ROOM = 5e-4  # [A] The jaws open this much wider than the part at least, on both sides [m].
+DENSEST, LIGHTEST = 22600.0, 20.0  # [kg/m3] Osmium; foam.
+
+
+def machine_findings(product: Product, config: CellConfig) -> Iterator[Finding]:
+    """Yield findings on masses, grasps and torques."""
+    gripper, payload = _holder(config)
+    for part in product.parts.values():
+        yield from _mass(part, gripper, payload)
+        yield from _grasps(part, gripper)
+    yield from _screws(product, config)
+
+
+def _holder(config: CellConfig) -> tuple[GripperModel, float]:
+    """Return the gripper, and what its arm carries besides [kg].
+
+    Raises:
+        UnknownName: No arm carries a gripper.
+    """
+    for arm in config.arms.values():
+        if arm.tool in GRIPPER_MODELS:
+            gripper = GRIPPER_MODELS[arm.tool]
+            own = gripper.palm_mass + 2 * gripper.finger_mass
+            return gripper, arm_model(arm.model).payload - own
+    raise UnknownName("gripper on", "an arm", GRIPPER_MODELS)
+
+
+def _mass(part: Part, gripper: GripperModel, payload: float) -> Iterator[Finding]:
+    if part.mass > payload:
+        text = f"{part.mass:.3g} kg, and the arm carries {payload:.3g} kg besides {gripper.name}"
+        yield fails(part.name, text)
+    volume = float(part.mesh.volume)
+    if not LIGHTEST < part.mass / volume < DENSEST:
+        text = f"{part.mass:.3g} kg in {1e6 * volume:.3g} cm3 is no material: wrong units?"
+        yield doubtful(part.name, text)
+
+
+def _grasps(part: Part, gripper: GripperModel) -> Iterator[Finding]:
+    if not part.grasps:
+        yield fails(part.name, "it has no grasp; give it one in the product file")
+        return
+    usable = 0
+    for grasp in part.grasps:
+        setback = gripper.setback[grasp.jaw]
+        least, most = setback, setback + gripper.stroke - 2 * LEAST_ROOM
+        if not least < grasp.width <= most:
+            yield doubtful(
+                part.name,
+                f"grasp '{grasp.name}' is {1e3 * grasp.width:.4g} mm wide; jaw '{grasp.jaw}' of "
+                f"{gripper.name} grips {1e3 * least:.3g} to {1e3 * most:.3g} mm",
+            )
+        elif 2 * grasp.force > gripper.effort:
+            yield doubtful(
+                part.name,
+                f"grasp '{grasp.name}' presses with {grasp.force:g} N; {gripper.name} has "
+                f"{gripper.effort / 2:g} N per pad",
+            )
+        else:
+            usable += 1
+    if not usable:
+        yield fails(part.name, f"none of its grasps suits {gripper.name}")
+
+
+def _screws(product: Product, config: CellConfig) -> Iterator[Finding]:
+    most = largest_torque(config.driver.seat_speed)
+    asked: dict[float, list[str]] = {}
+    for name, screw in product.screws.items():
+        asked.setdefault(screw.torque, []).append(name)
+    for torque, names in asked.items():
+        subject = ", ".join(names)
+        if torque > most:
+            yield fails(
+                subject,
+                f"{torque:.3g} N m, and the driver gives {most:.3g} at driver.seat_speed = "
+                f"{config.driver.seat_speed:g} rad/s",
+            )
+        else:
+            yield good(subject, f"{torque:.3g} N m of the {most:.3g} that the driver gives")

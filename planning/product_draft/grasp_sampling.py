@@ -1,0 +1,206 @@
+"""Grasps of a part for the parallel-jaw hand: sampled, checked and ranked.
+
+Jaws come from above to pick and place, and from the side to hold a part while it is screwed down.
+Everything is in the product frame A, in which parts are drawn where they belong.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import fcl
+import numpy as np
+import trimesh
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cell.products.product import Grasp
+from planning.product_draft.depth_maps import DepthMaps
+from planning.product_draft.hand_shape import JAWS, HandShape, surface
+
+PAD_FRICTION = 0.5  # [D] 2 a b / (a + b) of the pads' 0.8 and of 0.36, machined metal.
+LEAST_AREA = 8e-6  # [A] Of contact [m2]; a nose on a head of 3 mm has 9.
+GOOD_AREA = 1.5e-4  # [A] More is no better [m2].
+STEP = 2.5e-3  # Between jaw places on a part [m].
+SIDES_WANTED = 8  # [A] Closing directions, those with the most area.
+MARGIN, TIGHT = 1e-3, 2e-4  # [A] Kept from what stands around, open and closed [m].
+BACK = (0.0, 0.015, 0.05)  # Along the approach, where the opened hand is checked [m].
+CLEARANCE = 4e-3  # The jaws open this much wider than the part [m]; see operations.grasping.
+TILTS = np.deg2rad([0.0, 12.0, 24.0])  # [A] Of a side grasp, palm up.
+KEPT = 6  # [A] Grasps of one kind that are kept.
+FAR_APART = 4e-3  # [A] Grasps that are nearer count as one [m].
+LARGEST_FORCE, LEAST_FORCE = 65.0, 5.0  # [R] Of 130 N for both pads; [A] a screw's.
+GRAVITY = 9.81
+LIFT_FACTOR = 10.0  # [A] Grip over the weight that friction just bears: an arm brakes.
+USUAL_FORCE, LIGHT = 40.0, 5e-3  # [A] As of the products drawn by hand [N]; lighter: less [kg].
+
+
+@dataclass(frozen=True)
+class RankedGrasp:
+    """A grasp with what speaks for it.
+
+    Attributes:
+        grasp: In the part's frame.
+        score: More is better.
+        area: Of contact [m2].
+        lever: Distance of the mass centre from the line between the pads, across the approach [m].
+    """
+
+    grasp: Grasp
+    score: float
+    area: float
+    lever: float
+
+
+def sample_grasps(
+    mesh: trimesh.Trimesh,
+    mass: float,
+    hand: HandShape,
+    up: np.ndarray,
+    around: Sequence[fcl.BVHModel],
+    *,
+    from_side: bool = False,
+) -> list[RankedGrasp]:
+    """Return grasps of a part, best first.
+
+    Args:
+        mesh: The part in A [m].
+        mass: [kg].
+        hand: The gripper.
+        up: (3,) direction that points up on the jig and in the tray.
+        around: Surfaces that the hand keeps clear of, where the part is taken or put.
+        from_side: Whether the hand comes from the side, and not from above.
+    """
+    own = surface(mesh)
+    found: list[RankedGrasp] = []
+    for R in _orientations(mesh, up, from_side):
+        maps = DepthMaps.of(mesh, R)
+        candidates = sorted(_candidates(mesh, mass, hand, maps, R), key=lambda g: -g.score)
+        kept = 0
+        for ranked in candidates:
+            if kept == 2:
+                break
+            if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around):
+                continue
+            found.append(ranked)
+            kept += 1
+    found.sort(key=lambda g: -g.score)
+    return _named(found[:KEPT], "side" if from_side else "top")
+
+
+def _orientations(mesh: trimesh.Trimesh, up: np.ndarray, from_side: bool) -> Iterator[np.ndarray]:
+    """Yield the axes of jaws, (3, 3) columns closing, lateral, approach."""
+    for closing in _closing_directions(mesh, up):
+        if not from_side:
+            yield np.column_stack([closing, np.cross(-up, closing), -up])
+            continue
+        level = np.cross(up, closing)
+        for approach in (level, -level):
+            for tilt in TILTS:
+                z = np.cos(tilt) * approach - np.sin(tilt) * up
+                yield np.column_stack([closing, np.cross(z, closing), z])
+
+
+def _closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarray]:
+    """Return horizontal directions along which there is most surface to grip, both ways each."""
+    level = np.abs(mesh.face_normals @ up) < 0.05
+    if not level.any():
+        return []
+    side = np.linalg.svd(up[None])[2][1]
+    across = np.cross(up, side)
+    normals = mesh.face_normals[level]
+    angle = np.round(np.rad2deg(np.arctan2(normals @ across, normals @ side))) % 180.0
+    areas = {a: float(mesh.area_faces[level][angle == a].sum()) for a in np.unique(angle)}
+    chosen = sorted(areas, key=lambda a: (-round(areas[a], 8), a))[: SIDES_WANTED // 2]
+    turns = [np.deg2rad(a + half) for a in chosen for half in (0.0, 180.0)]
+    return [np.cos(t) * side + np.sin(t) * across for t in turns]
+
+
+def _candidates(
+    mesh: trimesh.Trimesh, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+) -> Iterator[RankedGrasp]:
+    """Yield the grasps with jaws along R that hold a part, whatever else is around."""
+    p_Com = mesh.center_mass @ R
+    setback = 1e-3
+    for jaw in JAWS:
+        face, (least, most) = hand.faces[jaw], hand.widths(jaw)
+        half_y, half_z = face.size[0] / 2.0, face.size[1] / 2.0
+        ys = _places(maps.y, p_Com[1], half_y)
+        zs = _places(maps.z, p_Com[2], half_z - setback)
+        for y in ys:
+            for z in zs:
+                grip = maps.grip((y - half_y, y + half_y), (z - half_z, z + half_z))
+                if (
+                    grip is None
+                    or not least <= grip.width <= most - 1e-3
+                    or grip.area < LEAST_AREA
+                    or not grip.force_closed(PAD_FRICTION)
+                ):
+                    continue
+                lever = abs(y - p_Com[1])
+                force = _force(mass, lever, grip.spread)
+                if force > LARGEST_FORCE:
+                    continue
+                score = min(grip.area / GOOD_AREA, 1.0) - 30.0 * lever - 5.0 * abs(z - p_Com[2])
+                p_PJaw = R @ [grip.middle, y - face.middle[0], z - face.middle[1]]
+                X_PJaw = RigidTransform(RotationMatrix(R), p_PJaw)
+                grasp = Grasp("", jaw, X_PJaw, grip.width, force)
+                yield RankedGrasp(grasp, score, grip.area, lever)
+
+
+def _places(grid: np.ndarray, middle: float, half: float) -> np.ndarray:
+    """Return the places of a face that meets a part, from the middle outwards."""
+    low, high = grid[0] - half + STEP, grid[-1] + half - STEP
+    steps = np.arange(np.ceil((low - middle) / STEP), np.floor((high - middle) / STEP) + 1)
+    return middle + STEP * steps[np.argsort(np.abs(steps), kind="stable")]
+
+
+def _force(mass: float, lever: float, spread: float) -> float:
+    """Return the grip force per pad [N]: it bears the weight, and its moment about the pads."""
+    weight = mass * GRAVITY
+    bears = weight / (2.0 * PAD_FRICTION)
+    turns = weight * lever / (2.0 * PAD_FRICTION * max(spread, 5e-4))
+    usual = USUAL_FORCE if mass > LIGHT else LEAST_FORCE
+    return float(np.ceil(max(LIFT_FACTOR * bears, 2.0 * turns, usual)))
+
+
+def _is_near(ranked: RankedGrasp, found: Sequence[RankedGrasp]) -> bool:
+    """Return whether a grasp is nearly one of those found."""
+    X = ranked.grasp.X_PJaw
+    return any(
+        other.grasp.jaw == ranked.grasp.jaw
+        and np.linalg.norm(other.grasp.X_PJaw.translation() - X.translation()) < FAR_APART
+        and other.grasp.X_PJaw.rotation().IsNearlyEqualTo(X.rotation(), 0.2)
+        for other in found
+    )
+
+
+def _is_clear(
+    grasp: Grasp, hand: HandShape, own: fcl.BVHModel, around: Sequence[fcl.BVHModel]
+) -> bool:
+    """Return whether the opened hand comes without touching anything, and closes likewise."""
+    closed = grasp.width - hand.gripper.setback[grasp.jaw]
+    opening = min(closed + CLEARANCE, hand.gripper.stroke)
+    X_PTip = grasp.X_PJaw @ RigidTransform(-hand.p_TipJaw[grasp.jaw])
+    for back in BACK:
+        X = X_PTip @ RigidTransform([0.0, 0.0, -back])
+        if _hits(hand.shape(opening, MARGIN), X, around) or _hits(
+            hand.shape(opening, 0.0), X, [own]
+        ):
+            return False
+    return not _hits(hand.shape(closed, TIGHT), X_PTip, around)
+
+
+def _hits(hand: fcl.BVHModel, X: RigidTransform, around: Sequence[fcl.BVHModel]) -> bool:
+    one = fcl.CollisionObject(hand, fcl.Transform(X.rotation().matrix(), X.translation()))
+    others = (fcl.CollisionObject(other, fcl.Transform()) for other in around)
+    request = fcl.CollisionRequest()
+    return any(fcl.collide(one, other, request, fcl.CollisionResult()) for other in others)
+
+
+def _named(found: Sequence[RankedGrasp], family: str) -> list[RankedGrasp]:
+    """Return grasps with names: those of one family stand in for each other."""
+    return [
+        replace(ranked, grasp=replace(ranked.grasp, name=f"{family}_{number + 1}"))
+        for number, ranked in enumerate(found)
+    ]

@@ -1,0 +1,130 @@
+"""The grasps of a product's parts, with what stands around where they are taken and put."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+import trimesh
+from pydrake.math import RigidTransform, RotationMatrix
+
+from cell.cad.nests import Nest
+from cell.cad.screwdriver import (
+    HOUSING_RADIUS,
+    NOSE_LENGTH,
+    NOSE_RADIUS,
+    SHAFT_LENGTH,
+    SHAFT_RADIUS,
+)
+from cell.cad.shapes import joined
+from cell.products.product import Grasp, Part
+from planning.product_draft.grasp_sampling import RankedGrasp, sample_grasps
+from planning.product_draft.guess import Guess
+from planning.product_draft.hand_shape import HandShape, surface
+from planning.product_draft.joint_guesses import ScrewGuess
+
+BED_RISE = 0.016  # [M] The bed reaches this far up a part that is pressed in [m].
+BED_SIDE = 0.3  # Of the plane that stands for it [m].
+NOSE_HEIGHT = 1.8e-3  # [D] 0.3 mm between the nose and what the head rests on [m].
+SCREW_FORCE = 5.0  # [A] [N].
+HOUSING_SHOWN = 0.05  # Of the driver's housing: no hand is higher [m].
+
+
+def part_grasps(
+    part: Part,
+    hand: HandShape,
+    up: np.ndarray,
+    *,
+    base: trimesh.Trimesh,
+    earlier: Sequence[trimesh.Trimesh],
+    nest: Nest,
+    screws: Sequence[ScrewGuess] = (),
+    apart: float = 0.0,
+) -> tuple[list[Grasp], list[Guess]]:
+    """Return the grasps of a part, from above and, if it is held while screwed, from the side.
+
+    Args:
+        part: With its place in the tray; its frame is the product frame A.
+        hand: The gripper.
+        up: (3,) direction that points up.
+        base: The part that the fixture holds, in A [m].
+        earlier: What is there when it is put, in A [m].
+        nest: Its place in the tray.
+        screws: That clamp it: it is held from the side, beside the driver, while they are driven.
+        apart: Distance kept between the arms [m].
+    """
+    bed = surface(_bed(base, up))
+    assert part.X_TrayP is not None
+    taken = surface(_nest_in_part(nest, part.X_TrayP))
+    put = [surface(mesh) for mesh in earlier]
+    above = sample_grasps(part.mesh, part.mass, hand, up, [taken, bed, *put])
+    guesses = [_guess(part.name, above, "from above")]
+    side: list[RankedGrasp] = []
+    if screws:
+        driver = surface(joined([_driver_over(screw, apart) for screw in screws]))
+        around = [bed, *put, driver]
+        side = sample_grasps(part.mesh, part.mass, hand, up, around, from_side=True)
+        guesses.append(_guess(part.name, side, "from the side, while it is screwed down"))
+    return [ranked.grasp for ranked in (*above, *side)], guesses
+
+
+def screw_grasp(screw: ScrewGuess) -> Grasp:
+    """Return the grasp of a screw's head with the noses; it can be turned about the axis."""
+    R = RotationMatrix(np.column_stack([[1, 0, 0], [0, -1, 0], [0, 0, -1]]).astype(float))
+    at = RigidTransform(R, [0.0, 0.0, NOSE_HEIGHT])
+    return Grasp("head", "nose", at, screw.head_size[0], SCREW_FORCE)
+
+
+def _driver_over(screw: ScrewGuess, apart: float) -> trimesh.Trimesh:
+    """Return head and driver of a screw that is being driven, thicker by a distance, in A."""
+    diameter, height = screw.head_size
+    nose, housing = SHAFT_LENGTH - apart, SHAFT_LENGTH + NOSE_LENGTH - apart
+    lengths = [
+        (diameter / 2, 0.0, height),
+        (SHAFT_RADIUS + apart, height, nose),
+        (NOSE_RADIUS + apart, nose, housing),
+        (HOUSING_RADIUS + apart, housing, housing + HOUSING_SHOWN),
+    ]
+    cylinders = []
+    for radius, low, high in lengths:
+        cylinder = trimesh.creation.cylinder(radius, high - low, sections=16)
+        cylinder.apply_translation([0.0, 0.0, (low + high) / 2])
+        cylinders.append(cylinder)
+    column = joined(cylinders)
+    X = trimesh.geometry.align_vectors([0, 0, 1], screw.axis)
+    column.apply_transform(X)
+    column.apply_translation(screw.p_AoP)
+    return column
+
+
+def _guess(part: str, found: Sequence[RankedGrasp], how: str) -> Guess:
+    if not found:
+        return Guess(part, f"no grasp {how}", "nothing fits between what is around", 0.9)
+    best = found[0]
+    what = f"{len(found)} grasps {how}, the best {1e3 * best.grasp.width:.3g} mm wide"
+    reason = (
+        f"jaw {best.grasp.jaw}, {1e6 * best.area:.0f} mm2 of contact, "
+        f"{1e3 * best.lever:.1f} mm from the mass centre"
+    )
+    return Guess(part, what, reason, 0.8)
+
+
+def _bed(base: trimesh.Trimesh, up: np.ndarray) -> trimesh.Trimesh:
+    """Return a slab whose upper face is where the bed reaches up the fixed part."""
+    top = float((base.vertices @ up).min()) + BED_RISE
+    size = np.where(np.abs(up) > 0.5, 0.02, BED_SIDE)
+    centre = base.vertices.mean(axis=0)
+    centre = centre - up * (centre @ up) + up * (top - 0.01)
+    return trimesh.creation.box(size, trimesh.transformations.translation_matrix(centre))
+
+
+def _nest_in_part(nest: Nest, X_TrayP: RigidTransform) -> trimesh.Trimesh:
+    """Return the boxes of a nest in the frame of the part in it [m]."""
+    boxes = []
+    for piece in nest.pieces:
+        if isinstance(piece.shape, trimesh.Trimesh):
+            raise TypeError("a nest is made of boxes")
+        size = np.asarray(piece.shape.size())
+        X_PS = X_TrayP.inverse() @ piece.X_PS
+        boxes.append(trimesh.creation.box(size, X_PS.GetAsMatrix4()))
+    return joined(boxes)

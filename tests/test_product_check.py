@@ -1,0 +1,148 @@
+"""What would fail is said before anything is simulated: one line each, naming part or step."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from drawn_products import covered_block, write_meshes
+
+from cell.configuration.config import CellConfig
+from cell.products.joints import Rest
+from cell.products.loading import load_product
+from cell.products.product import Grasp, Part, Product
+from experiments.cli.main import main
+from planning.product_check.check import plan_findings
+from planning.product_check.finding import Level
+from planning.product_check.machine_limits import machine_findings
+
+CONFIG = CellConfig()
+
+
+@pytest.fixture(scope="module")
+def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The product file of a block, a cover and two screws, drafted from meshes."""
+    folder = tmp_path_factory.mktemp("covered")
+    source = write_meshes(covered_block(), folder / "cad")
+    out = folder / "own"
+    assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet"]) == 0
+    return out / "product.yaml"
+
+
+@pytest.fixture(scope="module")
+def product(file: Path) -> Product:
+    return load_product(file)
+
+
+def changed(product: Product, name: str, **changes: object) -> Product:
+    """Return a product with one part changed."""
+    parts = dict(product.parts)
+    parts[name] = replace(parts[name], **changes)  # pyright: ignore[reportArgumentType]
+    return replace(product, parts=parts)
+
+
+def said(findings: Iterator, level: Level) -> str:  # pyright: ignore
+    """Return the lines of a level."""
+    return "\n".join(str(finding) for finding in findings if finding.level is level)
+
+
+def test_a_drafted_product_passes(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(file)]) == 0
+    printed = capsys.readouterr().out
+    for step in ("place block", "rest cover", "place bolts", "tighten bolts"):
+        assert f"{step}: every pose is reached" in printed
+
+
+def test_a_tray_inside_the_jig_is_found(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["check", str(file), "--set", "workcell.p_WT=[0, 0.2, 0.2]"]) == 1
+    assert "mm into the jig" in capsys.readouterr().out
+
+
+def test_a_step_that_is_out_of_reach_is_named(
+    file: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert main(["check", str(file), "--set", "workcell.p_WT=[-0.28, 1.6, 0.03]"]) == 1
+    assert "place block: The left arm cannot bring" in capsys.readouterr().out
+
+
+def test_torque_beyond_the_driver(product: Product) -> None:
+    joints = tuple(
+        replace(joint, torque=1.2) if joint in product.screws.values() else joint
+        for joint in product.joints
+    )
+    found = said(machine_findings(replace(product, joints=joints), CONFIG), Level.FAILS)
+    assert "screw_1, screw_2: 1.2 N m, and the driver gives" in found
+    assert said(machine_findings(product, CONFIG), Level.FAILS) == ""
+
+
+def test_a_part_too_heavy_for_the_arm(product: Product) -> None:
+    heavy = changed(product, "block", mass=4.5)
+    assert "block: 4.5 kg, and the arm carries" in said(
+        machine_findings(heavy, CONFIG), Level.FAILS
+    )
+
+
+def test_a_density_of_no_material(product: Product) -> None:
+    wrong = changed(product, "cover", mass=1e-6)
+    assert "wrong units?" in said(machine_findings(wrong, CONFIG), Level.DOUBTFUL)
+
+
+def with_grasp(product: Product, **changes: object) -> Product:
+    part: Part = product.parts["block"]
+    grasp: Grasp = replace(part.grasps[0], **changes)  # pyright: ignore[reportArgumentType]
+    return changed(product, "block", grasps=(grasp,))
+
+
+@pytest.mark.parametrize(
+    ("changes", "doubt"),
+    [({"width": 0.08}, "is 80 mm wide; jaw 'tip' of hand_e grips"), ({"force": 90.0}, "90 N")],
+)
+def test_grasps_that_the_hand_cannot_do(
+    product: Product, changes: dict[str, float], doubt: str
+) -> None:
+    found = list(machine_findings(with_grasp(product, **changes), CONFIG))
+    assert doubt in said(iter(found), Level.DOUBTFUL)
+    assert "block: none of its grasps suits hand_e" in said(iter(found), Level.FAILS)
+
+
+def test_a_part_without_grasps(product: Product) -> None:
+    assert "it has no grasp" in said(
+        machine_findings(changed(product, "cover", grasps=()), CONFIG), Level.FAILS
+    )
+
+
+def test_a_step_that_no_operation_can_run_is_named(product: Product) -> None:
+    joints = tuple(joint for joint in product.joints if not isinstance(joint, Rest))
+    found, todo = plan_findings(replace(product, joints=joints), None, CONFIG)
+    assert todo == []
+    assert "No operation brings 'cover' to block" in said(iter(found), Level.FAILS)
+
+
+def test_what_comes_from_the_side_is_named(product: Product) -> None:
+    """The same parts lying on their side: all but the first would have to come from there."""
+    found, todo = plan_findings(replace(product, up="+y"), ("block", "cover", "screws"), CONFIG)
+    assert todo == []
+    assert "no operation comes from the side" in said(iter(found), Level.FAILS)
+
+
+def test_an_order_that_is_impossible_is_said(product: Product) -> None:
+    found, todo = plan_findings(product, ("block", "screws", "cover"), CONFIG)
+    assert todo == []
+    assert said(iter(found), Level.FAILS).startswith("fails    order:")
+
+
+def test_a_product_without_a_tray(file: Path, tmp_path: Path) -> None:
+    text = file.read_text().replace("tray: cad_tray", "# tray: cad_tray")
+    bare = file.parent / "bare.yaml"
+    bare.write_text(text)
+    try:
+        assert main(["check", str(bare), "--quiet"]) == 1
+    finally:
+        bare.unlink()
+
+
+@pytest.mark.slow
+def test_covered_block_is_assembled_from_its_meshes(file: Path, tmp_path: Path) -> None:
+    """From four STL files to the last screw, with no edit by hand."""
+    arguments = ["assemble", str(file), "--out", str(tmp_path), "--quiet"]
+    assert main(arguments) == 0
