@@ -274,7 +274,8 @@ def test_placement_leaves_log_and_report(placed: Path) -> None:
         assert f"motor: {PlacePhase.PRESS.value}" in log["phase_name"]
     page = (placed / "report.html").read_text()
     assert "place motor" in page
-    assert "position_error_m" in page or "position error m" in page
+    assert "position error" in page
+    assert "later grasps are planned around the place" in page, "the reason of its limit"
 
 
 def test_interrupted_run_continues_bit_identically(placed: Path) -> None:

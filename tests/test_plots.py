@@ -6,12 +6,11 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-from experiments.reporting.plots import DPI, SIZE, draw, plot_force_plate
+from experiments.reporting.plots import DPI, SIZE, draw, plot_forces
 from planning.operations.plot import Plot
 
 N = 50
 RAMP = np.linspace(0.0, 1.0, N)
-FORCE = np.stack([RAMP, 0.5 * RAMP, -10.0 * RAMP], axis=1)
 
 
 def curves(scale: float) -> Plot:
@@ -21,8 +20,11 @@ def curves(scale: float) -> Plot:
 
 PLOTS = {
     "curves": lambda scale: draw(curves(scale)),
-    "plate": lambda scale: plot_force_plate(
-        20.0 * RAMP, scale * FORCE, phases=[("press", 0.0), ("release", 5.0)]
+    "forces": lambda scale: plot_forces(
+        20.0 * RAMP,
+        {"normal": scale * 10.0 * RAMP, "shear": RAMP},
+        [("place", 0.0), ("insert", 5.0)],
+        [(20.0, scale * 10.0)],
     ),
 }
 
@@ -47,4 +49,4 @@ def test_empty_run_still_gives_a_picture() -> None:
     """An assembly that failed before its first bolt has a report all the same."""
     nothing = np.zeros(0)
     assert pixels(draw(Plot("", "x", "y", {}))).size
-    assert pixels(plot_force_plate(nothing, np.zeros((0, 3)))).size
+    assert pixels(plot_forces(nothing, {"normal": nothing})).size

@@ -9,6 +9,7 @@ from typing import Any
 import pytest
 
 from experiments.reporting.report import write_report
+from planning.operations.limits import Limit
 
 VOID = {"meta", "img", "br"}
 PNG = base64.b64decode(
@@ -83,7 +84,7 @@ def outline(folder: Path, **changes: Any) -> Outline:
 
 def test_report_shows_verdicts_measurements_and_plan(tmp_path: Path) -> None:
     text = re.sub(r"\s+", " ", outline(tmp_path).text)
-    for expected in ("fasten bolts", "clamp_force_N", "830.1", "12.35", "0.1235", "success"):
+    for expected in ("fasten bolts", "clamp force", "830 N", "12.35", "0.1235", "success"):
         assert expected in text
     for expected in ("bolt_1, bolt_2", "0.04091", "only +z is free & it is up", "1.51.1"):
         assert expected in text
@@ -107,6 +108,21 @@ def test_pictures_are_held_unchanged_and_captioned(tmp_path: Path) -> None:
     assert "a < b" in page.text
 
 
+def test_video_is_held_like_a_picture(tmp_path: Path) -> None:
+    gif = b"GIF89a" + PNG
+    page = outline(tmp_path, videos=[("the run", gif)])
+    assert page.urls[0].startswith("data:image/gif;base64,")
+    assert base64.b64decode(page.urls[0].split(",")[1]) == gif
+
+
+def test_limits_and_phases_are_shown(tmp_path: Path) -> None:
+    limits = {"fasten bolts": {"clamp_force_N": Limit("clamp_force_N", 1000.0, "it holds")}}
+    phases = [{"phase": "bolt_1: tighten", "begins_s": 1.0, "lasts_s": 0.5}]
+    text = outline(tmp_path, limits=limits, phases=phases).text.replace("\xa0", " ")
+    for expected in ("1000 N", "17 %", "it holds", "bolt_1: tighten"):
+        assert expected in text
+
+
 def test_text_is_never_markup(tmp_path: Path) -> None:
     page = outline(tmp_path, title="<b>bold</b>", notes=["<i>no pictures</i>"])
     assert "<b>bold</b>" in page.text
@@ -127,7 +143,7 @@ def test_cases_stand_in_place_of_steps(tmp_path: Path) -> None:
     page = outline(tmp_path, plan={}, result=result)
     assert "Cases" in page.text
     assert "motor/P2/a" in page.text
-    assert "0.0542" in page.text
+    assert "54.2" in page.text
 
 
 def test_same_content_gives_the_same_file(tmp_path: Path) -> None:

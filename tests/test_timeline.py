@@ -12,6 +12,7 @@ from matplotlib.image import imread
 from cell import build_cell, load_product
 from cell.configuration.config import CellConfig
 from cell.simulation.phase import Jaw, Phase, Spin, motion_finished
+from experiments.assembly.figures import phase_at, step_peaks
 from experiments.assembly.timeline import Timeline, fixture_bars
 from experiments.reporting.gantt import COLORS, Bar, plot_bars
 from planning.motion.timing import JointMotion
@@ -62,6 +63,19 @@ def test_fixture_acts_while_what_it_reads_changes(timeline: Timeline) -> None:
     assert (bar.start, bar.end) == pytest.approx((1.0, 2.0), abs=0.011)
     assert bar.step == "step"
     assert not list(fixture_bars({"time": time}, timeline.bars))
+
+
+def test_peak_of_each_step_is_found_with_its_phase() -> None:
+    time = np.arange(0.0, 4.0, 0.01)
+    force = 9.0 * np.exp(-(((time - 1.5) / 0.1) ** 2)) + 5.0 * (time > 3.0)
+    rows = step_peaks(time, force, [0.0, 2.0, 3.995])
+    assert time[rows] == pytest.approx([1.5, 3.01])
+    log = {
+        "phase_name": np.array(["go", "press", "wait"]),
+        "phase_start": np.array([0.0, 1.0, 2.0]),
+    }
+    assert [phase_at(log, float(time[row])) for row in rows] == ["press", "wait"]
+    assert step_peaks(time, 0.01 * force, [0.0]) == [], "nothing worth a number"
 
 
 def test_chart_shows_each_class_in_its_colour_on_its_lane(timeline: Timeline) -> None:

@@ -6,8 +6,9 @@ import numpy as np
 from pydrake.math import RigidTransform
 
 from cell.machines.gripper import GripperReading
+from cell.simulation.conditions import Steady
 from cell.simulation.phase import Condition, Sensed
-from planning.operations.waiting import QUIET_TIME, Steady, at_rest, steady_jaws, steady_wrist
+from planning.operations.waiting import QUIET_TIME, at_rest, steady_jaws, steady_wrist
 
 STEP = 1e-3
 

@@ -20,6 +20,7 @@ from cell.builder import Cell
 from cell.errors import RunFailure
 from cell.machines.driver import DriverReading
 from cell.machines.gripper import GripperReading
+from cell.simulation.vocabulary import in_programs
 
 
 class Motion(Protocol):
@@ -35,6 +36,7 @@ class Motion(Protocol):
         ...
 
 
+@in_programs
 @dataclass(frozen=True)
 class Impedance:
     """Cartesian impedance of a frame C about a moving target D.
@@ -56,6 +58,7 @@ class Impedance:
     bias: np.ndarray = field(default_factory=lambda: np.zeros(6))
 
 
+@in_programs
 @dataclass(frozen=True)
 class Follow:
     """A joint target that a function computes every step from what is sensed: a servo.
@@ -67,6 +70,7 @@ class Follow:
     target: Callable[[Sensed], tuple[np.ndarray, np.ndarray]]
 
 
+@in_programs
 @dataclass(frozen=True)
 class Jaw:
     """Drive a gripper to an opening, pressing with a force once something is in between.
@@ -80,6 +84,7 @@ class Jaw:
     force: float = 0.0
 
 
+@in_programs
 @dataclass(frozen=True)
 class Spin:
     """Turn a driver's spindle.
@@ -108,6 +113,7 @@ class Sensed:
         drivers: By device: axial push, torque and speed of the spindle.
         finished: Whether every motion of the phase has come to its end.
         X_WF: Pose of a frame, from the joint encoders.
+        signal: What a device says by name: "fixture fixed", "fixture freed", "NAME in bit".
     """
 
     time: float
@@ -117,6 +123,7 @@ class Sensed:
     drivers: Mapping[str, DriverReading]
     finished: bool
     X_WF: Callable[[Frame], RigidTransform]
+    signal: Callable[[str], bool] = field(default=lambda name: False)
 
 
 Condition = Callable[[Sensed], bool]
@@ -150,14 +157,47 @@ class Running(Protocol):
 Event = Callable[[Running], None]
 
 
-def motion_finished(sensed: Sensed) -> bool:
+def what_is_missing(condition: Condition, sensed: Sensed) -> str:
+    """Return what a condition that does not hold is waiting for; "" if it cannot say.
+
+    A condition says so with a method ``missing(sensed)``.
+    """
+    missing: Callable[[Sensed], str] = getattr(condition, "missing", lambda sensed: "")
+    return missing(sensed)
+
+
+@in_programs
+@dataclass(frozen=True)
+class Finished:
     """End condition: all motions are at their end."""
-    return sensed.finished
+
+    def __call__(self, sensed: Sensed) -> bool:
+        """Return whether they are."""
+        return sensed.finished
+
+    def missing(self, sensed: Sensed) -> str:
+        """Return what it is waiting for."""
+        return "" if sensed.finished else "a motion is not at its end"
+
+
+@in_programs
+@dataclass(frozen=True)
+class After:
+    """End condition: the phase has lasted this long [s]."""
+
+    seconds: float
+
+    def __call__(self, sensed: Sensed) -> bool:
+        """Return whether it has."""
+        return sensed.time >= self.seconds
+
+
+motion_finished = Finished()
 
 
 def after(seconds: float) -> Condition:
-    """End condition: the phase has lasted this long."""
-    return lambda sensed: sensed.time >= seconds
+    """End condition: the phase has lasted this long [s]."""
+    return After(seconds)
 
 
 @dataclass(frozen=True)

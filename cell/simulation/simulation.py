@@ -32,12 +32,14 @@ from cell.simulation.phase import (
     Sensed,
     SolverFailed,
     Spin,
+    what_is_missing,
 )
 
 # Damping of the Cartesian impedance uses these effective masses: dominated by the reflected rotor
 # inertia of 0.1 kg m^2 at a lever of 0.15 to 0.4 m [D].
 EFFECTIVE_MASS = 5.0
 EFFECTIVE_INERTIA = 0.15
+IN_BIT = " in bit"  # After the name of a bolt: the signal that the bit is in its socket.
 # Of what an arm with more than six joints can do without moving its hand [N m s/rad] [A].
 SELF_MOTION_DAMPING = 10.0
 
@@ -149,7 +151,9 @@ class Simulation:
                 kept = replace(sensed, grippers=dict(sensed.grippers), drivers=dict(sensed.drivers))
                 return Outcome(kept, run.peak_force)
             if sensed.time > phase.timeout:
-                raise PhaseFailed(phase.name, f"end condition not met in {phase.timeout:g} s")
+                missing = what_is_missing(phase.until, sensed)
+                evidence = f"end condition not met in {phase.timeout:g} s"
+                raise PhaseFailed(phase.name, f"{evidence}: {missing}" if missing else evidence)
 
 
 class WhenRead[Reading](Mapping[str, Reading]):
@@ -224,15 +228,25 @@ class _PhaseRun:
             arm = self.cell.arms[name]
             if isinstance(command, Follow):
                 if self.last is not None:
-                    arm.drive.set_target(self.root, *command.target(self.last))
+                    q, v = command.target(self.last)
+                    self._check(name, q, v)
+                    arm.drive.set_target(self.root, q, v)
             elif isinstance(command, Impedance):
                 now = self.step * time_step
                 torque = impedance_torque(arm, self.simulation.context, command, now)
+                self._check(name, torque)
                 arm.drive.set_effort(self.root, torque)
             else:
                 # The implicit drive reaches the target at the end of the step.
                 now = self.step * time_step
-                arm.drive.set_target(self.root, *command.at(now + time_step))
+                q, v = command.at(now + time_step)
+                self._check(name, q, v)
+                arm.drive.set_target(self.root, q, v)
+
+    def _check(self, arm: str, *values: np.ndarray) -> None:
+        """Refuse a command that is no number, before it makes the whole state none."""
+        if not all(np.isfinite(value).all() for value in values):
+            raise PhaseFailed(self.phase.name, f"the command for the {arm} arm is not finite")
 
     def sense(self) -> Sensed:
         """Read the sensors after a step, and log if it is time."""
@@ -252,10 +266,22 @@ class _PhaseRun:
             drivers=WhenRead(lambda name: self.drivers[name].read(context), self.drivers),
             finished=all(now >= motion.duration for motion in motions),
             X_WF=lambda frame: frame.CalcPoseInWorld(context),
+            signal=self._signal,
         )
         if self.phase.fine_log or simulation.steps % self.log_every == 0:
             self._log(self.last)
         return self.last
+
+    def _signal(self, name: str) -> bool:
+        """Return what the fixture, or the sensor in the bit, says."""
+        fixture, threads, root = self.cell.fixture, self.cell.threads, self.root
+        says = {"fixture fixed": fixture.fixed, "fixture freed": fixture.freed}
+        if name in says:
+            return says[name](root)
+        bolt = name.removesuffix(IN_BIT)
+        if bolt == name:
+            raise UnknownName("signal", name, [*says, *(f"{bolt}{IN_BIT}" for bolt in threads)])
+        return threads.bit_engaged(root, bolt)
 
     def _log(self, sensed: Sensed) -> None:
         cell, context, root = self.cell, self.simulation.context, self.root

@@ -2,13 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+from typing import Any
+
 from rich.console import Console
 
 from cell.errors import InputError
+from experiments.assembly.film import Film
+from experiments.assembly.films import write_films
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import RunningCell
+from experiments.assembly.program_files import write_program
 from experiments.assembly.progress import Progress, result_table
+from experiments.assembly.recording import check_recordable
 from experiments.assembly.replay import Replay
 from experiments.assembly.results import Keeper, write_infeasible
 from experiments.assembly.resume import go_on, read_resumable
@@ -16,6 +23,7 @@ from experiments.assembly.run import Run
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.operations.operation import NoOperation, Step
+from planning.operations.program import Program, Transcript
 from planning.operations.sequence import steps
 
 
@@ -30,9 +38,13 @@ def run_job(job: Job) -> int:
     """
     console = Console(quiet=job.quiet, highlight=False)
     job.product.check_simulable()
+    if job.record is not None:
+        check_recordable()
+    if job.program is not None and job.start is not None:
+        raise InputError("A program begins with the first step: leave out --program or --start.")
     fixing = plan(job.product, job.order, config=job.config)
     try:
-        todo = _steps(job, fixing)
+        todo = planned = _steps(job, fixing)
     except NoOperation as reason:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
@@ -41,16 +53,63 @@ def run_job(job: Job) -> int:
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:
         console.print(f"Watch at {replay.url}", soft_wrap=True)
-    run = Run(RunningCell(job.product, job.config, job.seed, replay))
+    film = Film() if job.record or job.video else None
+    run = Run(RunningCell(job.product, job.config, job.seed, replay, film))
     if start is not None:
         todo = go_on(run, todo, start)
-    pictures = Pictures(run.running)
-    progress = Progress(console, [step.name for step in todo])
-    with Keeper(job, fixing, run) as keeper:
+    transcript = Transcript(job.product)
+    if job.program is not None:
+        todo = [transcript.of(step) for step in todo]
+    code = _carry_out(job, run, todo, fixing, planned)
+    if job.program is not None:
+        problem = write_program(job.program, job, fixing.order, run, transcript)
+        if problem is not None:
+            console.print(f"No program: {problem}.", markup=False, soft_wrap=True)
+    return code
+
+
+def run_program(job: Job, data: Mapping[str, Any]) -> int:
+    """Carry out a program in the twin; write result, log and report.
+
+    Args:
+        job: Its product, configuration and seed.
+        data: Of the program.
+
+    Returns:
+        0 if everything succeeded, else 1.
+
+    Raises:
+        InputError: It is the program of another product; nothing is written.
+    """
+    job.product.check_simulable()
+    todo = Program(job.product, data).steps()
+    run = Run(RunningCell(job.product, job.config, job.seed))
+    if run.simulation.identity["product"] != data["identity"]:
+        raise InputError(
+            f"The program is of another product: {data['identity']}, "
+            f"not {run.simulation.identity['product']}."
+        )
+    return _carry_out(job, run, todo, None, todo)
+
+
+def _carry_out(
+    job: Job, run: Run, todo: Sequence[Step], fixing: FixingPlan | None, steps: Sequence[Step]
+) -> int:
+    """Run the steps that are left of all, keep what they leave behind, and say how they went.
+
+    Returns:
+        The exit code.
+    """
+    console, pictures = Console(quiet=job.quiet, highlight=False), Pictures(run.running)
+    progress, running = Progress(console, [step.name for step in todo]), run.running
+    with Keeper(job, fixing, run, steps) as keeper:
         with progress:
             run.watchers = (keeper, progress, pictures)
             run.run(todo)
-        replay.save()
+        if running.replay is not None:
+            running.replay.save()
+        if running.film is not None:
+            write_films(job, run, running.film, pictures)
         keeper.finish(pictures)
     console.print(result_table(run.steps))
     if run.failure is not None:

@@ -21,7 +21,10 @@ class Job:
         seed: Seeds disturbance, sensor noise and sampling planners.
         out: Existing folder for the results.
         view: Whether to show the run in a browser.
-        replay: Where to write a recording; None for none.
+        replay: Where to write a page that replays the run; None for none.
+        record: Where to write an MCAP recording; None for none.
+        video: Where to write an animated GIF; None for none.
+        program: Folder for a robot program of the run; None for none.
         quiet: Whether to print nothing.
         command: What is recorded as the command.
         last: The operation to stop after; None for the whole assembly.
@@ -35,6 +38,9 @@ class Job:
     out: Path
     view: bool = False
     replay: Path | None = None
+    record: Path | None = None
+    video: Path | None = None
+    program: Path | None = None
     quiet: bool = False
     command: str = "assemble"
     last: Operation | None = None

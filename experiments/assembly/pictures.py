@@ -16,6 +16,7 @@ class Pictures:
 
     Attributes:
         taken: Caption and PNG each.
+        videos: Caption and GIF each, made after the run.
         problem: Why there are none, or None.
     """
 
@@ -23,6 +24,7 @@ class Pictures:
         self.running = running
         self.problem = rendering_problem()
         self.taken: list[Picture] = []
+        self.videos: list[Picture] = []
 
     def phase(self, name: str) -> None:
         """Phases are too many to picture."""

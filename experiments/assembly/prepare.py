@@ -10,9 +10,11 @@ from pydrake.systems.framework import DiagramBuilder
 from cell.builder import add_cell
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
+from cell.monitor import join_monitors
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, hand_over, restore_state, save_state
+from experiments.assembly.film import Film
 from experiments.assembly.replay import Replay
 from planning.operations.operation import Operation
 from planning.operations.station import Station
@@ -67,6 +69,7 @@ class RunningCell:
         config: Every number of the cell, as the planner believes it to be.
         seed: Seeds disturbance, sensor noise and sampling planners.
         replay: Where it is shown; None: nowhere.
+        film: Keeps the surfaces of the jig; None: they are not wanted.
         disturbance: How far the cell is from what the planner takes it for.
         simulation: That runs at present.
         station: The planner's view of it.
@@ -76,6 +79,7 @@ class RunningCell:
     config: CellConfig
     seed: int
     replay: Replay | None = None
+    film: Film | None = None
     disturbance: Disturbance = field(init=False)
     simulation: Simulation = field(init=False)
     station: Station = field(init=False)
@@ -139,8 +143,10 @@ class RunningCell:
         if self.replay is not None:
             self.replay.add_to(builder, cell)
         simulation = Simulation(cell.with_diagram(builder.Build()))
-        if self.replay is not None:
-            self.replay.follow(simulation)
+        followers = [each for each in (self.replay, self.film) if each is not None]
+        monitors = [each.follow(simulation) for each in followers]
+        joined = join_monitors(simulation.cell.monitor, *filter(None, monitors))
+        simulation.simulator.set_monitor(joined)
         source = TruthSource.of(simulation.cell, simulation.root, self.seed)
         station = Station(simulation.cell, simulation.root, source, self.seed, nominal=config)
         return simulation, station

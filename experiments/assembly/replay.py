@@ -26,13 +26,14 @@ from cell.errors import UnknownName
 from cell.fixtures.soft_jig import SoftJig
 from cell.fixtures.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
 from cell.fixtures.soft_jig.visual import membrane_shape
-from cell.monitor import join_monitors
 from cell.simulation.simulation import Simulation
+from experiments.assembly.film import Monitor
 from experiments.reporting.output import write_text
 
 FRAME_PERIOD = 0.05  # Between two pictures [s] [A].
 MEMBRANE_PERIOD = 0.1  # Between two surfaces of the membrane [s] [A]; each costs about 0.3 MB.
-CAMERA = ((0.8, 1.9, 1.25), (0.0, 0.05, 0.25))  # Where it stands and what it looks at, in W [m].
+# Where it stands and what it looks at, in W [m]: the jig with both hands over it.
+CAMERA = ((0.36, 0.7, 0.5), (0.0, 0.13, 0.26))
 
 
 class MembraneFilm(LeafSystem):
@@ -131,25 +132,29 @@ class Replay:
             film = MembraneFilm(cell.fixture, cell.X_WJ, self.meshcat, still)
             self.film = builder.AddSystem(film)
         self.meshcat.SetCameraPose(*CAMERA)
+        for helper in ("/Axes", "/Grid"):
+            self.meshcat.SetProperty(helper, "visible", False)
         if self.file is not None:
             self.meshcat.StartRecording(
                 frames_per_second=1.0 / FRAME_PERIOD, set_visualizations_while_recording=self.view
             )
 
-    def follow(self, simulation: Simulation) -> None:
+    def follow(self, simulation: Simulation) -> Monitor | None:
         """Show a simulation of the built diagram, or how the same bodies move in another one.
 
         The membrane is that of the first: it does not change while another one runs.
+
+        Returns:
+            What has to be called after each step of the simulation; None: nothing.
         """
         if self.meshcat is None:
-            return
-        if self._drawn is None:
-            self._drawn = simulation
-            if self.film is not None:
-                self.film.root = simulation.root
-        else:
-            mirror = Mirror(simulation, self._drawn)
-            simulation.simulator.set_monitor(join_monitors(simulation.cell.monitor, mirror))
+            return None
+        if self._drawn is not None:
+            return Mirror(simulation, self._drawn)
+        self._drawn = simulation
+        if self.film is not None:
+            self.film.root = simulation.root
+        return None
 
     def save(self) -> None:
         """Write the recording, if one is wanted."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict
 from types import TracebackType
@@ -9,28 +10,24 @@ from typing import Any
 
 from cell.errors import CellError
 from cell.simulation.state import State
+from experiments.assembly import figures
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.resume import failed_state, resumable_state
 from experiments.assembly.run import Run, StepResult
-from experiments.assembly.timeline import fixture_bars
-from experiments.reporting.gantt import plot_bars
-from experiments.reporting.html_page import Picture
 from experiments.reporting.output import write_arrays, write_json
-from experiments.reporting.plots import draw, plot_force_plate
 from experiments.reporting.provenance import finite, versions
+from experiments.reporting.quantities import shown_as
 from experiments.reporting.report import write_report
 from experiments.reporting.result_file import RESULT, ResultFile
 from planning.assembly_plan.plan_file import plan_to_dict
 from planning.assembly_plan.planner import FixingPlan
-from planning.operations.operation import Arrays
-from planning.operations.phase_class import PhaseClass
+from planning.operations.operation import Step
 
 STATE, FAILED_STATE, LOG, REPORT = "state.npz", "failed_state.npz", "log.npz", "report.html"
 FILES = (RESULT, LOG, REPORT, STATE, FAILED_STATE)
 
 REPEATED = "carried out again with fine time steps, as the solver failed at a coarse one."
-ASLEEP = "A part that rests while nothing touches it sleeps: the force plate does not feel it then."
 
 
 def write_infeasible(job: Job, fixing: FixingPlan, reason: str) -> None:
@@ -52,12 +49,15 @@ class Keeper:
 
     Args:
         job: What was asked for.
-        fixing: Its plan.
+        fixing: Its plan; None if nothing is planned.
         run: Where it begins.
+        steps: All that it is to take, done or not.
     """
 
-    def __init__(self, job: Job, fixing: FixingPlan, run: Run) -> None:
-        self.job, self.fixing, self.run = job, fixing, run
+    def __init__(
+        self, job: Job, fixing: FixingPlan | None, run: Run, steps: Sequence[Step]
+    ) -> None:
+        self.job, self.fixing, self.run, self.steps = job, fixing, run, steps
         self.result = ResultFile(job.out, _summary(job, fixing))
         self.state: State = {}
         self._phase = ""
@@ -109,12 +109,15 @@ class Keeper:
         write_report(
             job.out / REPORT,
             title=f"{job.product.name}: {job.command}",
-            plan=plan_to_dict(self.fixing),
+            plan={} if self.fixing is None else plan_to_dict(self.fixing),
             result=result,
+            videos=pictures.videos,
             pictures=pictures.taken,
-            timeline=_timeline(run, log),
-            plots=_plots(run, log),
+            timeline=figures.timeline(run, log),
+            plots=figures.plots(run, log),
             notes=_notes(run, pictures),
+            limits={step.name: step.limits for step in self.steps},
+            phases=figures.phases(log),
         )
         # Last: whoever finds a verdict finds the rest, too.
         self.result.update(**result)
@@ -128,12 +131,12 @@ def _remove_former(job: Job, *own: str) -> None:
             (job.out / name).unlink(missing_ok=True)
 
 
-def _summary(job: Job, fixing: FixingPlan) -> dict[str, Any]:
+def _summary(job: Job, fixing: FixingPlan | None) -> dict[str, Any]:
     start = {} if job.start is None else {"start": job.start}
     return {
         "command": job.command,
         "product": job.product.name,
-        "order": list(fixing.order),
+        "order": list((job.order or ()) if fixing is None else fixing.order),
         "seed": job.seed,
         "verdict": "running",
         "config": finite(job.config.to_dict()),
@@ -164,37 +167,19 @@ def _step(step: StepResult) -> dict[str, Any]:
 
 
 def _notes(run: Run, pictures: Pictures) -> list[str]:
-    notes = [ASLEEP]
+    notes = []
     if run.failure is not None:
         notes.append(f"Failed in '{run.failure.phase}': {run.failure.evidence}")
     for step in run.steps:
         if step.repeated:
             notes.append(f"{step.name}: {REPEATED}")
         for check in step.failed_checks:
-            value = "not measured" if check.value is None else f"{check.value:.4g}"
+            shown = shown_as(check.quantity)
+            part = check.quantity.rpartition("/")[0]
             notes.append(
-                f"{step.name}: {check.quantity} is {value}, limit {check.limit:.4g}: {check.reason}"
+                f"{step.name}: {f'{part} ' if part else ''}{shown.label} is "
+                f"{shown.text(check.value)}, limit {shown.text(check.limit)}: {check.reason}"
             )
     if pictures.problem is not None:
         notes.append(f"No pictures: {pictures.problem}.")
     return notes
-
-
-def _timeline(run: Run, log: Arrays) -> list[Picture]:
-    bars = run.timeline.bars
-    if not bars:
-        return []
-    bars = [*bars, *fixture_bars(log, bars)]
-    return [("Arms and fixture", plot_bars(bars, [kind.value for kind in PhaseClass]))]
-
-
-def _plots(run: Run, log: Arrays) -> list[Picture]:
-    if "time" not in log:
-        return []
-    starts = [(record.step.name, record.start.time) for record in run.records]
-    force = log["force_plate"][:, 3:] - log["force_plate"][0, 3:]
-    plots = [("Force plate", plot_force_plate(log["time"], force, starts))]
-    for record in run.records:
-        for plot in record.step.operation.plots(run.simulation.cell, record, log):
-            plots.append((plot.caption, draw(plot)))
-    return plots

@@ -39,7 +39,16 @@ class Assemble:
     """Show the run in a browser while it goes on."""
 
     replay: Annotated[Path | None, arg(metavar="FILE.html")] = None
-    """Write a recording that plays in any browser, offline."""
+    """Write a page that replays the run in any browser, offline."""
+
+    record: Annotated[Path | None, arg(metavar="FILE.mcap")] = None
+    """Write joint states, wrenches, poses and meshes, for Foxglove."""
+
+    video: Annotated[Path | None, arg(metavar="FILE.gif")] = None
+    """Write a short video of the jig; the report shows it, too. Costs some CPU seconds."""
+
+    program: Annotated[Path | None, arg(metavar="DIR")] = None
+    """Write the run as a robot program: JSON with conditions and guards, and URScript."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
@@ -58,10 +67,14 @@ class Assemble:
             from experiments.assembly.results import FILES
 
             out = folders.enter_context(output_folder(self.common.out, *FILES))
-            if self.replay is not None:
-                folders.enter_context(writable_folder(self.replay.absolute().parent))
-                if self.replay.is_dir() or not self.replay.name:
-                    raise BadUsage(f"--replay {self.replay}: it is a folder, not a file.")
+            files = {"replay": self.replay, "record": self.record, "video": self.video}
+            for option, file in files.items():
+                if file is not None:
+                    folders.enter_context(writable_folder(file.absolute().parent))
+                    if file.is_dir() or not file.name:
+                        raise BadUsage(f"--{option} {file}: it is a folder, not a file.")
+            if self.program is not None:
+                folders.enter_context(writable_folder(self.program))
             from cell.products.loading import load_product, require_product_file
             from cell.products.read_options import ReadOptions
             from experiments.assembly.assemble import run_job
@@ -76,6 +89,9 @@ class Assemble:
                 out=out,
                 view=self.view,
                 replay=self.replay,
+                record=self.record,
+                video=self.video,
+                program=self.program,
                 quiet=self.common.quiet,
                 command=command,
                 last=last,

@@ -8,7 +8,7 @@ from html import escape
 from pathlib import Path
 from typing import Any
 
-Picture = tuple[str, bytes]  # Caption and PNG.
+Picture = tuple[str, bytes]  # Caption, and PNG or GIF.
 STYLE = Path(__file__).with_name("report.css")
 VERDICTS = ("success", "failure")
 
@@ -27,14 +27,23 @@ def section(heading: str, content: str) -> str:
     return f"<h2>{heading}</h2>\n{content}" if content else ""
 
 
-def figures(pictures: Iterable[Picture]) -> str:
-    """Return pictures with their captions, side by side if the page is wide enough."""
+def figures(pictures: Iterable[Picture], *, wide: bool = False) -> str:
+    """Return pictures with their captions: side by side if the page is wide enough, or each wide.
+
+    Args:
+        pictures: PNG or GIF.
+        wide: Whether each takes the whole width.
+    """
     each = "\n".join(
-        f'<figure><img alt="{escape(caption)}" src="data:image/png;base64,'
-        f'{base64.b64encode(png).decode()}"><figcaption>{escape(caption)}</figcaption></figure>'
-        for caption, png in pictures
+        f'<figure><img alt="{escape(caption)}" src="data:{_media_type(data)};base64,'
+        f'{base64.b64encode(data).decode()}"><figcaption>{escape(caption)}</figcaption></figure>'
+        for caption, data in pictures
     )
-    return f'<div class="figures">\n{each}\n</div>' if each else ""
+    return f'<div class="figures{" wide" if wide else ""}">\n{each}\n</div>' if each else ""
+
+
+def _media_type(data: bytes) -> str:
+    return "image/gif" if data[:4] == b"GIF8" else "image/png"
 
 
 def table(rows: Sequence[Mapping[str, Any]], columns: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import io
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -27,24 +27,33 @@ def draw(plot: Plot) -> bytes:
     return _png(figure, axes)
 
 
-def plot_force_plate(
-    time: np.ndarray, force: np.ndarray, phases: Sequence[tuple[str, float]] = ()
+def plot_forces(
+    time: np.ndarray,
+    forces: Mapping[str, np.ndarray],
+    steps: Sequence[tuple[str, float]] = (),
+    marks: Sequence[tuple[float, float]] = (),
 ) -> bytes:
-    """Plot the force on the force plate under the jig.
+    """Plot forces over time.
 
     Args:
         time: (n,) [s].
-        force: (n, 3) force on the plate in W [N].
-        phases: Name and start [s] of each phase, drawn as labelled lines.
+        forces: Label -> (n,) [N].
+        steps: Name and start [s] of each step, drawn as labelled lines.
+        marks: Time [s] and force [N] of points to be numbered from 1, for the caption.
     """
     figure, axes = _axes("time [s]", "force [N]")
-    axes.plot(time, np.abs(force[:, 2]), label="normal")
-    axes.plot(time, np.hypot(force[:, 0], force[:, 1]), label="shear")
-    for name, start in phases:
-        axes.axvline(start, color="0.8", linewidth=0.8, zorder=0)
+    for label, force in forces.items():
+        axes.plot(time, force, label=label, linewidth=1.2)
+    for name, start in steps:
+        axes.axvline(start, color="0.7", linewidth=0.8, zorder=0)
         axes.annotate(
-            name, (start, 1.0), xycoords=("data", "axes fraction"), rotation=90,
-            fontsize=6, color="0.4", ha="left", va="top",
+            name, (start, 1.0), xycoords=("data", "axes fraction"), xytext=(2, 3),
+            textcoords="offset points", fontsize=8, color="0.3",
+        )  # fmt: skip
+    for number, (x, y) in enumerate(marks, start=1):
+        axes.annotate(
+            str(number), (x, y), xytext=(0, 4), textcoords="offset points", fontsize=8,
+            fontweight="bold", ha="center",
         )  # fmt: skip
     return _png(figure, axes)
 

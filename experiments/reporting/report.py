@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from experiments.reporting.html_page import Picture, cell, figures, page, pairs, section, table
+from experiments.reporting.measured import Limits, measured_tables
 from experiments.reporting.output import write_text
 
 SUMMARY = ("command", "product", "order", "seed", "real_time_factor")
@@ -18,6 +19,7 @@ CASE_COLUMNS = (
     "part", "posture", "direction", "meaning", "trials", "successes", "expected", "verdict",
 )  # fmt: skip
 LINK_COLUMNS = ("pair", "share_of_time", "returns")
+PHASE_COLUMNS = ("phase", "begins_s", "lasts_s")
 OUTCOME_COLUMNS = ("quantity", "outcome", "trials", "mean", "interval", "paper_mean", "welch_p")
 
 
@@ -27,10 +29,13 @@ def write_report(
     title: str,
     plan: Mapping[str, Any],
     result: Mapping[str, Any],
+    videos: Sequence[Picture] = (),
     pictures: Sequence[Picture] = (),
     timeline: Sequence[Picture] = (),
     plots: Sequence[Picture] = (),
     notes: Sequence[str] = (),
+    limits: Mapping[str, Limits] | None = None,
+    phases: Sequence[Mapping[str, Any]] = (),
 ) -> None:
     """Write a self-contained report.
 
@@ -39,10 +44,13 @@ def write_report(
         title: Of the page.
         plan: Content of ``plan.json``; empty if nothing was planned.
         result: Content of ``result.json``, with ``steps`` or ``cases``.
+        videos: Caption and GIF each.
         pictures: Caption and PNG each, in order.
         timeline: The same, of who did what when.
         plots: The same, of what was measured.
         notes: Remarks for the reader, for example why there are no pictures.
+        limits: By name of a step, what its measured quantities are held against.
+        phases: Name, begin and duration of each, in order.
     """
     config = escape(json.dumps(result.get("config", {}), indent=2, default=str))
     settings = f"<details><summary>All settings</summary><pre>{config}</pre></details>"
@@ -51,10 +59,11 @@ def write_report(
         section("Steps", table(result.get("steps", ()), STEP_COLUMNS)),
         section("Cases", table(result.get("cases", ()), CASE_COLUMNS)),
         section("Successes and failures", table(_outcomes(result), OUTCOME_COLUMNS)),
+        section("Measured", _measured(result, limits or {})),
+        section("Video", figures(videos)),
         section("Pictures", figures(pictures)),
-        section("Who does what when", figures(timeline)),
+        section("Who does what when", figures(timeline, wide=True) + _phases(phases)),
         section("Plots", figures(plots)),
-        section("Measured", _measured(result)),
         section("Contact links", table(_links(result), LINK_COLUMNS)),
         section("Plan", _plan(plan)),
         section("Versions", pairs(result.get("versions", {}))),
@@ -70,16 +79,21 @@ def _summary(title: str, result: Mapping[str, Any], notes: Sequence[str]) -> str
     return f"<h1>{escape(title)}</h1>\n<p>{verdict}</p>\n{paragraphs}{pairs(facts)}"
 
 
-def _measured(result: Mapping[str, Any]) -> str:
-    """Return all measured quantities, one row per step and quantity."""
-    rows = []
+def _measured(result: Mapping[str, Any], limits: Mapping[str, Limits]) -> str:
+    """Return what was measured in each step or case, against its limits."""
+    tables = []
     for step in (*result.get("steps", ()), *result.get("cases", ())):
         name = step.get("name") or "/".join(
             str(step[key]) for key in ("part", "posture", "direction") if key in step
         )
-        for quantity, value in step.get("measured", {}).items():
-            rows.append({"step": name, "quantity": quantity, "value": value})
-    return table(rows, ("step", "quantity", "value"))
+        tables.append(measured_tables(name, step.get("measured", {}), limits.get(name, {})))
+    return "\n".join(filter(None, tables))
+
+
+def _phases(phases: Sequence[Mapping[str, Any]]) -> str:
+    """Return the phases, folded away."""
+    rows = table(phases, PHASE_COLUMNS)
+    return f"<details><summary>All phases</summary>{rows}</details>" if rows else ""
 
 
 def _outcomes(result: Mapping[str, Any]) -> list[dict[str, Any]]:

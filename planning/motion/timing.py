@@ -23,6 +23,7 @@ from pydrake.trajectories import PiecewisePolynomial
 from cell.errors import RunFailure
 from cell.machines.arm import Arm
 from cell.paths import model_url, new_parser
+from cell.simulation.vocabulary import in_programs
 from planning.motion.joint_path import JointPath
 
 GRID_STEP = 0.05  # Between two points at which the limits are imposed [rad] [A].
@@ -73,6 +74,7 @@ class SpeedLimit:
     speed: float
 
 
+@in_programs
 @dataclass(frozen=True)
 class JointMotion:
     """Joint angles over time, from rest to rest.

@@ -10,6 +10,7 @@ import numpy as np
 
 from cell.products.product import Grasp
 from cell.simulation.phase import Command, Outcome, Phase, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import (
     Reach,
@@ -40,6 +41,7 @@ class Coming:
 Meanwhile = Callable[[Coming], Mapping[str, Command]]
 
 
+@in_programs
 class HoldPhase(Enum):
     """Coming to an assembled part to hold it, or getting out of the way."""
 

@@ -12,7 +12,9 @@ from pydrake.math import RigidTransform
 from cell.machines.arm import Unreachable
 from cell.machines.grippers import GripperModel
 from cell.products.product import Grasp
-from cell.simulation.phase import Guard, Jaw, Outcome, Phase, Sensed, motion_finished
+from cell.simulation.conditions import LostGrasp
+from cell.simulation.phase import Guard, Jaw, Outcome, Phase, PhaseFailed, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.motion.timing import JointMotion
 from planning.operations.look import look
 from planning.operations.station import Station
@@ -24,8 +26,12 @@ CLEAR = 0.012  # The jaws have left the part when they are this far back [m] [A]
 SHARES = (1.0, 0.75, 0.5)  # Of the way back, tried in this order [A].
 # A jaw that closes this much further than when it gripped holds nothing any more [m].
 LOST = 0.0015
+# A part that is seen this far from where the hand would have it did not come along [m] [A]: more
+# than it can slip between the pads, less than any lift.
+LEFT_BEHIND = 0.03
 
 
+@in_programs
 class HandPhase(Enum):
     """Taking a part and letting it go, in any operation."""
 
@@ -125,14 +131,8 @@ def lost_grasp(station: Station, held_opening: float | None = None) -> Guard:
         station: The planner's view of the cell.
         held_opening: Opening of the tip pads when they gripped [m]; None: as it is remembered now.
     """
-    gripper = station.holder.tool.name
-    least = (station.held_opening if held_opening is None else held_opening) - LOST
-
-    def guard(sensed: Sensed) -> str | None:
-        opening = sensed.grippers[gripper].opening
-        return f"lost grasp: jaws at {1e3 * opening:.2f} mm" if opening < least else None
-
-    return guard
+    held = station.held_opening if held_opening is None else held_opening
+    return LostGrasp(station.holder.tool.name, held - LOST)
 
 
 def take(
@@ -216,9 +216,30 @@ def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[P
         guard=guard,
         awake=awake,
     )
+    in_hand = station.pose_of(part)
     yield from look(
         station, HandPhase.LOOK_IN_HAND, part, station.in_hand, awake=awake, guard=guard
     )
+    check_lifted(part, in_hand, station.pose_of(part))
+
+
+def check_lifted(part: str, in_hand: RigidTransform, seen: RigidTransform) -> None:
+    """Fail the lift of a part that did not come along.
+
+    Jaws that slid off it are as far apart as before: nothing but a look tells.
+
+    Args:
+        part: Name of the part.
+        in_hand: X_WP where the hand would have it.
+        seen: X_WP where it is seen.
+
+    Raises:
+        PhaseFailed: It is not in the hand.
+    """
+    away = float(np.linalg.norm(seen.translation() - in_hand.translation()))
+    if away > LEFT_BEHIND:
+        evidence = f"lost grasp: the part is {1e3 * away:.0f} mm from where the hand would have it"
+        raise PhaseFailed(f"{part}: {HandPhase.LIFT.value}", evidence)
 
 
 def let_go(

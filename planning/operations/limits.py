@@ -63,19 +63,17 @@ def standing_limits(each: str) -> tuple[Limit, ...]:
 
 
 def failed_checks(
-    limits: Sequence[Limit], parts: Mapping[str, Sequence[str]], measured: Mapping[str, float]
+    limits: Mapping[str, Limit], measured: Mapping[str, float]
 ) -> tuple[FailedCheck, ...]:
     """Return every limit that the measured quantities of a step do not keep.
 
     Args:
-        limits: Of the step's operation.
-        parts: Names of its "parts" and of the "riders" on them.
+        limits: Of the step, by the names of what they bound.
         measured: Quantity -> value.
     """
     failed = []
-    for limit in limits:
-        for name in limit.names(parts):
-            value = measured.get(name)
-            if value is None or not abs(value) <= limit.limit:
-                failed.append(FailedCheck(name, value, limit.limit, limit.reason))
+    for name, limit in limits.items():
+        value = measured.get(name)
+        if value is None or not abs(value) <= limit.limit:
+            failed.append(FailedCheck(name, value, limit.limit, limit.reason))
     return tuple(failed)

@@ -17,7 +17,9 @@ from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
 
 from cell.configuration.config import InsertionConfig
-from cell.simulation.phase import Condition, Impedance, Outcome, Phase, Sensed, motion_finished
+from cell.simulation.conditions import All, Below, FirstOf, Height, Steady, TooMuchForce
+from cell.simulation.phase import Condition, Impedance, Outcome, Phase, after, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.operations.grasping import (
     Reach,
     comes_from_above,
@@ -32,7 +34,8 @@ from planning.operations.grasping import (
 )
 from planning.operations.look import look
 from planning.operations.station import FINE_CLEARANCE, Station
-from planning.operations.waiting import Steady, steady_wrist
+from planning.operations.targets import Descent, Spiral, There
+from planning.operations.waiting import steady_wrist
 
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].
@@ -71,6 +74,7 @@ class Mating:
     axis: np.ndarray
 
 
+@in_programs
 class MatePhase(Enum):
     """What comes besides taking the part and letting it go."""
 
@@ -186,12 +190,8 @@ def _insert(
     # C: the compliance centre, with the axes of the part.
     X_PC = RigidTransform(station.part(mating.part).X_AP.inverse() @ mating.p_AoC)
     X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
-    arm, holding = station.holder.name, lost_grasp(station)
-
-    def guard(sensed: Sensed) -> str | None:
-        force = float(np.linalg.norm(sensed.wrench[arm][3:]))
-        too_much = f"insertion force {force:.1f} N" if force > TOO_MUCH else None
-        return holding(sensed) or too_much
+    arm = station.holder.name
+    guard = FirstOf((lost_grasp(station), TooMuchForce(arm, TOO_MUCH, "insertion force")))
 
     def soft(
         kind: MatePhase, force: float, target: Target, until: Condition, timeout: float
@@ -209,8 +209,7 @@ def _insert(
             tare=kind is MatePhase.INSERT,
         )
 
-    def height(sensed: Sensed) -> np.ndarray:
-        return (sensed.X_WF(jaw) @ X_JawC).translation()[2:]
+    height = Height(jaw, X_JawC)
 
     def gap(outcome: Outcome) -> float:
         return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
@@ -220,11 +219,9 @@ def _insert(
     outcome = yield soft(MatePhase.INSERT, config.force_limit, *descending)
     if mating.depth > 0.0 and gap(outcome) > mating.depth / 2:
         mouth = gap(outcome)
-        search = spiral(X_WSeat, mouth - BEYOND, config)
-
-        def found(sensed: Sensed) -> bool:
-            return height(sensed)[0] - X_WSeat.translation()[2] < mouth - 1e-3
-
+        pitch, speed = config.search_pitch, config.search_speed
+        search = Spiral(raised(X_WSeat, mouth - BEYOND), pitch, speed)
+        found = Below(height, float(X_WSeat.translation()[2]) + mouth - 1e-3)
         length = config.search_radius**2 * np.pi / config.search_pitch
         yield soft(
             MatePhase.SEARCH, config.search_force, search, found, length / config.search_speed
@@ -254,7 +251,7 @@ def descent(
     X_WSeat: RigidTransform,
     start: float,
     config: InsertionConfig,
-    height: Callable[[Sensed], np.ndarray],
+    height: Height,
 ) -> tuple[Target, Condition, float]:
     """Return target, end condition and time-out of a descent from ``start`` above the seat [m].
 
@@ -265,36 +262,11 @@ def descent(
     heights = [start, LANDING, -LANDING, -BEYOND]
     speeds = [config.speed, config.landing_speed, config.speed]
     times = np.cumsum([0.0, *(-np.diff(heights) / speeds)])
-    stalled = Steady(height, STALLED, STALL_TIME)
-
-    def target(t: float) -> RigidTransform:
-        return raised(X_WSeat, float(np.interp(t, times, heights)))
-
-    def until(sensed: Sensed) -> bool:
-        return stalled(sensed) and sensed.time >= times[-1] + STALL_TIME
-
-    return target, until, float(times[-1]) + PATIENCE
+    stands = All((Steady(height, STALLED, STALL_TIME), after(float(times[-1]) + STALL_TIME)))
+    target = Descent(X_WSeat, times, np.array(heights))
+    return target, stands, float(times[-1]) + PATIENCE
 
 
-def pressing(
-    X_WC: RigidTransform, height: Callable[[Sensed], np.ndarray]
-) -> tuple[Target, Condition, float]:
+def pressing(X_WC: RigidTransform, height: Height) -> tuple[Target, Condition, float]:
     """Return target, end condition and time-out of a push straight down from where the part is."""
-    below = raised(X_WC, -BEYOND)
-    return lambda t: below, Steady(height, STALLED, STALL_TIME), PATIENCE
-
-
-def spiral(X_WSeat: RigidTransform, height: float, config: InsertionConfig) -> Target:
-    """Return a target on an Archimedean spiral of constant speed about the axis of the hole.
-
-    With pitch p the arc length is s = p angle^2 / (4 pi), so the angle is sqrt(4 pi s / p).
-    """
-
-    def target(t: float) -> RigidTransform:
-        angle = np.sqrt(4 * np.pi * config.search_speed * t / config.search_pitch)
-        radius = config.search_pitch * angle / (2 * np.pi)
-        X = raised(X_WSeat, height)
-        offset = radius * np.array([np.cos(angle), np.sin(angle), 0.0])
-        return RigidTransform(X.rotation(), X.translation() + offset)
-
-    return target
+    return There(raised(X_WC, -BEYOND)), Steady(height, STALLED, STALL_TIME), PATIENCE

@@ -92,10 +92,15 @@ class Step:
         yield from self.operation.carry_out(station, self)
         station.fixed = self.fixed_after(station.cell.product, station.fixed)
 
+    @property
+    def limits(self) -> dict[str, Limit]:
+        """What bounds its measured quantities, by their names."""
+        parts = {"parts": self.parts, "riders": self.riders}
+        return {name: limit for limit in self.operation.limits for name in limit.names(parts)}
+
     def failed_checks(self, measured: Mapping[str, float]) -> tuple[FailedCheck, ...]:
         """Return every limit of its operation that its measured quantities do not keep."""
-        parts = {"parts": self.parts, "riders": self.riders}
-        return failed_checks(self.operation.limits, parts, measured)
+        return failed_checks(self.limits, measured)
 
     def fixed_after(self, product: Product, fixed: tuple[str, ...]) -> tuple[str, ...]:
         """Return what the fixture holds after the step; ``fixed``: before it.

@@ -10,8 +10,10 @@ from pydrake.math import RigidTransform
 
 from cell.machines.arm import Unreachable
 from cell.products.product import Grasp
+from cell.simulation.conditions import All, PushesBack, Signal
 from cell.simulation.events import fix_part, prepare_fixture, receive_part
 from cell.simulation.phase import Phase, after, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.operations.grasping import (
     Reach,
     jaw_to_part,
@@ -47,6 +49,7 @@ LOOK_TIME = 0.2  # The part comes to rest in the tray [s] [A].
 SETTLE_TIME = 1.0
 
 
+@in_programs
 class PlacePhase(Enum):
     """What comes besides taking the part and letting it go."""
 
@@ -97,7 +100,6 @@ def pick_place(
         suits: Whether its pose on the fixture suits whatever else comes later.
     """
     arm, awake = station.holder, frozenset([part])
-    fixture, root = station.cell.fixture, station.root
     yield from look(
         station, PlacePhase.LOOK, part, settle=LOOK_TIME, start=(prepare_fixture,), awake=awake
     )
@@ -127,7 +129,7 @@ def pick_place(
     line = station.line(arm, frame, raised(X_WJaw, -down), speed=PRESS_SPEED, felt=force)
     yield Phase(
         PlacePhase.PRESS,
-        lambda sensed: sensed.wrench[arm.name][5] >= force,
+        PushesBack(arm.name, force),
         timeout=1.0 + down / PRESS_SPEED,
         subject=part,
         commands={arm.name: line},
@@ -146,10 +148,9 @@ def pick_place(
         tare=False,
     )
     # The bed moves a little as it freezes: the hand waits until that is over.
-    carried = steady_wrist(arm.name)
     yield Phase(
         PlacePhase.FIX,
-        lambda sensed: fixture.fixed(root) and carried(sensed),
+        All((Signal("fixture fixed"), steady_wrist(arm.name))),
         timeout=5.0,
         subject=part,
         guard=holding,

@@ -12,7 +12,9 @@ from enum import Enum
 import numpy as np
 from pydrake.math import RigidTransform
 
-from cell.simulation.phase import Phase, Sensed, motion_finished
+from cell.simulation.conditions import Either, PushesBack
+from cell.simulation.phase import Phase, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.operations.grasping import (
     Reach,
     jaw_to_part,
@@ -38,6 +40,7 @@ SLOW = 0.04  # At most, down to the seat [m/s] [A].
 RETREAT = 0.05
 
 
+@in_programs
 class BoltPhase(Enum):
     """What comes besides taking the bolt and letting it go."""
 
@@ -122,15 +125,11 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     screw = station.cell.product.screws[bolt]
     awake = held | {screw.into, screw.clamps} & frozenset(station.fixed)
     yield from look(station, BoltPhase.LOOK_IN, bolt, [bolt], awake=awake, guard=holding)
-
-    def stands(sensed: Sensed) -> bool:
-        return sensed.finished or bool(sensed.wrench[arm.name][5] > TOUCH_FORCE)
-
     under = at(raised(X_WStand, -2e-4))
     down = station.line(arm, jaw, under, speed=SLOW, felt=TOUCH_FORCE)
     yield Phase(
         BoltPhase.LOWER,
-        stands,
+        Either((motion_finished, PushesBack(arm.name, TOUCH_FORCE))),
         timeout=10.0,
         subject=bolt,
         commands={arm.name: down},

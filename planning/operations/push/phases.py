@@ -12,6 +12,7 @@ from scipy.interpolate import CubicSpline
 
 from cell.machines.arm import Unreachable
 from cell.simulation.phase import Jaw, Phase, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.motion.paths import NoPath, plan_line
 from planning.motion.timing import JointMotion
 from planning.operations.look import look
@@ -25,6 +26,7 @@ BEHIND = 0.02  # [m] [A]
 MOTION_STEP = 1e-3  # Between two samples of the push's motion [s] [A].
 
 
+@in_programs
 class PushPhase(Enum):
     """Coming to the start of a push, and the push."""
 

@@ -11,8 +11,10 @@ from enum import Enum
 
 from pydrake.math import RigidTransform
 
+from cell.simulation.conditions import Either, PushesBack, Signal
 from cell.simulation.events import free_part, release_part
-from cell.simulation.phase import Phase, Sensed, after, motion_finished
+from cell.simulation.phase import Phase, after, motion_finished
+from cell.simulation.vocabulary import in_programs
 from planning.operations.grasping import (
     Reach,
     comes_from_above,
@@ -39,6 +41,7 @@ RETREAT = 0.08
 SETTLE_TIME = 0.3
 
 
+@in_programs
 class AsidePhase(Enum):
     """What comes besides taking the part and letting it go."""
 
@@ -54,7 +57,7 @@ class AsidePhase(Enum):
 def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     """Yield the phases that take a part off the fixture and put it back into the tray."""
     ((part,), riders) = step.parts, step.riders
-    arm, fixture, root = station.holder, station.cell.fixture, station.root
+    arm = station.holder
     X_WGoal, awake = station.origins[part], frozenset([part, *riders])
     yield from look(station, AsidePhase.LOOK, part)
     reach = first(_useful(station, part, X_WGoal), part, station)
@@ -63,7 +66,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     # Freed first: pulled out of a frozen bed, the part would take its suction along.
     yield Phase(
         AsidePhase.FREE,
-        lambda sensed: fixture.freed(root),
+        Signal("fixture freed"),
         timeout=5.0,
         subject=part,
         guard=holding,
@@ -98,13 +101,9 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         guard=holding,
         awake=awake,
     )
-
-    def stands(sensed: Sensed) -> bool:
-        return sensed.finished or bool(sensed.wrench[arm.name][5] > TOUCH_FORCE)
-
     yield Phase(
         AsidePhase.SET_DOWN,
-        stands,
+        Either((motion_finished, PushesBack(arm.name, TOUCH_FORCE))),
         timeout=5.0,
         subject=part,
         commands={arm.name: station.line(arm, jaw, under, speed=SLOW, felt=TOUCH_FORCE)},

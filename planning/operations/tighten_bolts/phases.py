@@ -15,6 +15,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.machines.arm import Unreachable
+from cell.simulation.conditions import All, Below, Height, Signal
 from cell.simulation.phase import (
     Command,
     Follow,
@@ -25,6 +26,7 @@ from cell.simulation.phase import (
     after,
     motion_finished,
 )
+from cell.simulation.vocabulary import in_programs
 from cell.workpieces.thread import BIT_SEAT
 from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
@@ -47,6 +49,7 @@ REST_TIME = 0.2  # [s] [A]
 RETREAT = 0.05  # Of the gripper from what it held [m] [A].
 
 
+@in_programs
 class DrivePhase(Enum):
     """What comes besides holding the clamped part."""
 
@@ -83,6 +86,7 @@ def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
     return order
 
 
+@in_programs
 @dataclass
 class Feed:
     """Servo of the driver's arm: sink so that the bit holder's spring pushes with a set force.
@@ -113,6 +117,7 @@ class Feed:
         return q, v * rate
 
 
+@in_programs
 @dataclass
 class Clutch:
     """End condition: the spindle has kept up a torque; a shock does not trip it.
@@ -134,6 +139,11 @@ class Clutch:
             self._reached = sensed.time
         # Times are multiples of the step, so half a microsecond only absorbs rounding.
         return self._reached is not None and sensed.time >= self._reached + CLUTCH_TIME - 5e-7
+
+    def missing(self, sensed: Sensed) -> str:
+        """Return what it is waiting for."""
+        torque = sensed.drivers[self.tool].torque
+        return f"the spindle turns with {torque:.2f} N m, not with {self.torque:g} N m"
 
 
 def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
@@ -189,9 +199,9 @@ def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
 def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]:
     """Yield the phases that drive one bolt home."""
     driver, spindle = station.driver, station.driver.tool.name
-    config, root = station.config, station.root
+    config = station.config
     tip, screw = driver.frame("tool_tip"), station.cell.product.screws[bolt]
-    threads, awake = station.cell.threads, _awake(station, bolt)
+    awake = _awake(station, bolt)
     # What the bolt clamps together slips into place meanwhile.
     mating = frozenset([frozenset([screw.into, screw.clamps])])
 
@@ -216,7 +226,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         DrivePhase.BIT_IN,
         # That the hex has dropped into the socket is told by the model of the joint between them,
         # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
-        lambda sensed: sensed.finished and threads.bit_engaged(root, bolt),
+        All((motion_finished, Signal(f"{bolt} in bit"))),
         timeout=5.0,
         subject=bolt,
         commands={
@@ -234,11 +244,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     down = raised(station.tool_pose(driver, "tool_tip"), -depth)
     line = station.line(driver, tip, down, speed=FEED_LIMIT)
     feed = Follow(Feed(spindle, line, depth, config.driver.push_force, config.simulation.time_step))
-
-    def nearly_seated(sensed: Sensed) -> bool:
-        sunk = mouth - sensed.X_WF(bit).translation()[2]
-        return bool(sunk > screw.thread_depth - SLOW_BELOW)
-
+    nearly_seated = Below(Height(bit), float(mouth) - (screw.thread_depth - SLOW_BELOW))
     yield Phase(
         DrivePhase.RUN_DOWN,
         nearly_seated,

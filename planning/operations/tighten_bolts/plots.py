@@ -11,6 +11,13 @@ from planning.operations.plot import Plot
 from planning.operations.tighten_bolts.measures import thread_curve
 from planning.operations.tighten_bolts.phases import DRIVEN
 
+# What a reader asks about the curves.
+SPIKES = (
+    "Torque of the spindle's motor, which moves masses, too. The spike at zero turns: as the "
+    "thread catches, the spindle speeds up to run-down speed with the bolt on it. The spike below "
+    "zero: it brakes to seating speed shortly before the head seats. The bolt clamps nothing then"
+)
+SEATING = "The head seats where the torque begins to rise; from there on it clamps"
 LAST = np.pi / 4  # The tightening takes place within this angle before the trip [rad].
 
 
@@ -29,9 +36,9 @@ def plots(cell: Cell, record: StepRecord, log: Arrays) -> list[Plot]:
             end[bolt] = (angle - angle[-1])[last] / (2 * np.pi), torque[last]
     if not whole:
         return []
-    level = "target", cell.product.screws[record.step.parts[0]].torque
+    level = "clutch set to", cell.product.screws[record.step.parts[0]].torque
     labels = "angle [turns]", "torque [N m]"
     return [
-        Plot("Tightening, from the thread's catch", *labels, whole, level),
-        Plot("Tightening, up to the clutch's trip", *labels, end, level),
+        Plot(f"Tightening, from the thread's catch. {SPIKES}", *labels, whole, level),
+        Plot(f"Tightening, up to the clutch's trip. {SEATING}", *labels, end, level),
     ]
