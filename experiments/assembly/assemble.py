@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from rich.console import Console
 
 from cell.errors import InputError
+from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.job import Job
 from experiments.assembly.pictures import Pictures
 from experiments.assembly.prepare import RunningCell
@@ -37,6 +40,7 @@ def run_job(job: Job) -> int:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
         return 1
+    job = replace(job, config=with_fixture_for(job, todo))
     start = None if job.start is None else read_resumable(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:

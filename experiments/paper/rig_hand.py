@@ -65,7 +65,7 @@ class RigBench:
 
     def begin(self, disturbance: TrialDisturbance) -> RigHand:
         """Set up a trial: the part on a stand over the jig, the open hand around it."""
-        config, X_WJ = self.rig.config, self.rig.config.workcell.X_WJ
+        X_WJ = self.rig.config.workcell.X_WJ
         height = self.rig.fixture.entry_height + HOVER
         X_WP = planned_pose(self.rig.part.part, self.posture, X_WJ, height)
         simulation = RigSimulation(

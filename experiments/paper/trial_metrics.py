@@ -44,7 +44,7 @@ def tilt_between(X_JA: RigidTransform, X_JB: RigidTransform) -> float:
 
 
 def measure_place(trial: TrialRecord) -> Measured:
-    """Return pose and speed of the released part, its error on a seat, and the peak press forces."""
+    """Return pose and speed of the released part, its error on a seat, and peak press forces."""
     measured: Measured = {}
     if trial.placed is not None:
         drop = trial.planned.translation() - trial.placed.translation()

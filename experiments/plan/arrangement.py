@@ -11,9 +11,9 @@ from pydrake.math import RigidTransform
 
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.product import Product
+from cell.vectors import rotation_with_up
 from experiments.plan.drawn import Body, DrawnProduct, Shape, box
 from experiments.plan.scene import Color, SceneItem
-from cell.vectors import rotation_with_up
 from planning.feasibility.algorithm import FixingStep
 from planning.feasibility.directions import opposite
 

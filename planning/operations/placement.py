@@ -99,12 +99,13 @@ def choose_placement(
         suits: Whether the pose X_WP of the seated part suits whatever else comes later.
     """
     top = station.cell.fixture.entry_height
-    for yaw, X_WP, q in _placeable(station, part, up, reach, top + HOVER):
-        seated = _seated(station, part, X_WP)
-        X_WA = seated @ station.part(part).X_AP.inverse()
-        leaves = _leaves(station, reach, seated @ reach.grasp.X_PJaw, q)
+    yaws = _yaws(station, part, up)
+    for yaw, X_WP, q in _placeable(station, part, up, reach, top + HOVER, yaws):
+        X_WSeated = seated(station, part, X_WP)
+        X_WA = X_WSeated @ station.part(part).X_AP.inverse()
+        leaves = _leaves(station, reach, X_WSeated @ reach.grasp.X_PJaw, q)
         mates = all(_mates(station, name, X_WA) for name in later)
-        if leaves and mates and suits(seated):
+        if leaves and mates and suits(X_WSeated):
             return Placement(yaw, X_WP, q)
     X_WJaw = pose_on_jig(station, part, up, 0.0, top + HOVER) @ reach.grasp.X_PJaw
     raise Unreachable(station.holder.name, reach.grasp.jaw, X_WJaw, f"no yaw suits '{part}'")
@@ -127,7 +128,7 @@ def _yaws(station: Station, part: str, up: str) -> np.ndarray:
     return np.array([np.arctan2(R_turn[1, 0], R_turn[0, 0])])
 
 
-def _seated(station: Station, part: str, X_WP: RigidTransform) -> RigidTransform:
+def seated(station: Station, part: str, X_WP: RigidTransform) -> RigidTransform:
     """Return where a part that hovers at X_WP comes to lie."""
     X_JP = station.cell.fixture.seat(part)
     if X_JP is None:
@@ -135,15 +136,24 @@ def _seated(station: Station, part: str, X_WP: RigidTransform) -> RigidTransform
     return station.cell.X_WJ @ X_JP
 
 
+def reachable_yaws(station: Station, part: str, up: str, reach: Reach) -> list[float]:
+    """Return the yaws of a part over the fixture that the hand reaches, least turned first.
+
+    They are those at which a fixture that is made for the part may be set up.
+    """
+    height = station.cell.fixture.entry_height + HOVER
+    return [yaw for yaw, _, _ in _placeable(station, part, up, reach, height, YAWS)]
+
+
 def _placeable(
-    station: Station, part: str, up: str, reach: Reach, height: float
+    station: Station, part: str, up: str, reach: Reach, height: float, yaws: np.ndarray
 ) -> Iterator[tuple[float, RigidTransform, np.ndarray]]:
     """Yield yaw, X_WP and joint angles (n,) with the part over the fixture, least turned first."""
     arm, hand = station.holder, station.hand
     frame, near = arm.frame(reach.grasp.jaw), reach.q_before
     may_touch = [("held", "*"), (hand, "held"), (hand, part)]
     found = []
-    for yaw in _yaws(station, part, up):
+    for yaw in yaws:
         X_WP = pose_on_jig(station, part, up, yaw, height)
         X_WJaw = X_WP @ reach.grasp.X_PJaw
         for q in station.configurations(arm, frame, X_WJaw, near, may_touch)[:1]:
