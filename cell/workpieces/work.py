@@ -22,7 +22,7 @@ FROM_BELOW = 0.1  # Cosine to the vertical: a hand that points up further never 
 def fixture_work(
     config: CellConfig, product: Product, hand: GripperModel | None = None
 ) -> Work | None:
-    """Return what the configured fixture is made for; None: it takes any part.
+    """Return what the configured fixture is made for; None: it takes any part, or there is none.
 
     Args:
         config: Of the cell.
@@ -35,6 +35,8 @@ def fixture_work(
     if not fixture_class(config.workcell.fixture).custom:
         return None
     name = config.custom.held.part or _first(product)
+    if not name:
+        return None
     if name not in product.parts:
         raise UnknownName("part to hold (custom.held.part)", name, product.parts)
     part = product.parts[name]
