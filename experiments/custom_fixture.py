@@ -1,6 +1,6 @@
 """What has to be made or set up for a part: STL of the fixture, its settings, a picture.
 
-    python -m experiments.custom_fixture motor_unit --part motor --up +z --fixture rigid_jig
+    python -m experiments.custom_fixture motor_unit --part plate --up=-z --fixture rigid_jig
 
 Writes NAME.stl in mm, to be printed as it stands; fixture.json with pads, posts and gap; and
 fixture.png, empty and with the part, if the machine can render.

@@ -40,7 +40,8 @@ def fixture_work(
     if name not in product.parts:
         raise UnknownName("part to hold (custom.held.part)", name, product.parts)
     part = product.parts[name]
-    R_DP = rotation_with_up(config.custom.held.up or product.up) @ part.X_AP.rotation()
+    up = config.custom.held.up or product.up
+    R_DP = rotation_with_up(up) @ part.X_AP.rotation()
     tools = [arm.tool for arm in config.arms.values() if arm.tool in GRIPPER_MODELS]
     model = hand or GRIPPER_MODELS[tools[0]]
     hands = [
@@ -49,7 +50,7 @@ def fixture_work(
         if (R_DP @ grasp.X_PJaw.rotation()).matrix()[2, 2] < FROM_BELOW
         for hull in _room(model, grasp, R_DP.inverse() @ np.array([0.0, 0.0, WAY]))
     ]
-    return Work(name, part.mesh, R_DP, config.custom, tuple(hands))
+    return Work(name, up, part.mesh, R_DP, config.custom, tuple(hands))
 
 
 def _first(product: Product) -> str:

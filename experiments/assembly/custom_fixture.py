@@ -35,7 +35,7 @@ def with_fixture_for(job: Job, todo: Sequence[Step]) -> CellConfig:
             f"The plan fixes {', then '.join(fixed)}, and a {name} holds one part in one posture: "
             "choose another --order, or --fixture soft_jig."
         )
-    (part,) = fixed
+    part = fixed[0]
     config = job.config.with_changes({"custom.held.part": part, "custom.held.up": job.product.up})
     if config.custom.held.yaw_deg != 0.0:
         return config
