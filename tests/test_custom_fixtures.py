@@ -97,13 +97,15 @@ def test_part_goes_in_from_above_without_overlap(part: str, up: str) -> None:
 
 
 @pytest.mark.parametrize(("part", "up"), CASES)
-def test_contact_pieces_leave_the_pocket_free(part: str, up: str) -> None:
-    """The seated part overlaps none of them."""
-    work = bare(part, up)
+def test_contact_pieces_leave_pocket_and_hand_free(part: str, up: str) -> None:
+    """They overlap neither the seated part nor the hand, and are where the block is."""
+    work = fixture_work(config_for("rigid_jig", part, up), load_product("motor_unit"))
+    assert work is not None
     nest = design_nest(work)
-    pieces = [*slabs(nest, work), *floors(nest, work)]
-    overlaps = [(Manifold.hull_points(piece) ^ work.solid).volume() for piece in pieces]
-    assert max(overlaps) < 1e-6
+    pieces = [Manifold.hull_points(p) for p in (*slabs(nest, work), *floors(nest, work))]
+    assert max((piece ^ work.solid).volume() for piece in pieces) < 1e-6
+    assert max((piece ^ work.hand).volume() for piece in pieces) < 0.05
+    assert max((piece - nest.body).volume() for piece in pieces) < 0.3  # [mm3]
 
 
 @pytest.mark.parametrize(("part", "up"), CASES)
