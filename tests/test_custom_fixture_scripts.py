@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +13,6 @@ from cell import CellConfig, load_product
 from cell.errors import InputError
 from cell.fixtures.base import FixtureError
 from experiments.assembly.custom_fixture import with_fixture_for
-from experiments.assembly.job import Job
 from experiments.custom_fixture import main as write_fixture
 from experiments.fixture_comparison import main as compare_fixtures
 from experiments.paper.postures import POSTURES
@@ -31,31 +29,28 @@ EXACT = [
 ]
 
 
-def job_of(order: tuple[str, ...] | None, fixture: str, out: Path, **changes: float) -> Job:
-    config = CellConfig.load(overrides={"workcell.fixture": fixture, **changes})
-    return Job(load_product("motor_unit"), order, config, 0, out)
+NEST = CellConfig.load(overrides=["workcell.fixture=rigid_jig"])
 
 
-def test_assembly_has_its_fixture_made_for_what_the_plan_fixes(tmp_path: Path) -> None:
-    job = job_of(None, "rigid_jig", tmp_path, **{"custom.held.yaw_deg": 45.0})
-    todo = steps(job.product, plan(job.product, job.order, config=job.config))
-    held = with_fixture_for(job, todo).custom.held
+def test_assembly_has_its_fixture_made_for_what_the_plan_fixes() -> None:
+    product, turned = load_product("motor_unit"), NEST.with_changes({"custom.held.yaw_deg": 45.0})
+    todo = steps(product, plan(product))
+    held = with_fixture_for(turned, product, 0, todo).custom.held
     assert (held.part, held.up, held.yaw_deg) == ("motor", "+z", 45.0)
-    soft = replace(job, config=CellConfig())
-    assert with_fixture_for(soft, todo) is soft.config
+    soft = CellConfig()
+    assert with_fixture_for(soft, product, 0, todo) is soft
 
 
-def test_plan_that_fixes_two_parts_is_refused(tmp_path: Path) -> None:
-    job = job_of(("plate", "bolts", "motor"), "rigid_jig", tmp_path)
-    todo = steps(job.product, plan(job.product, job.order, config=job.config))
+def test_plan_that_fixes_two_parts_is_refused() -> None:
+    product = load_product("motor_unit")
+    todo = steps(product, plan(product, ("plate", "bolts", "motor")))
     with pytest.raises(InputError, match="fixes plate, then motor, and a rigid_jig holds one part"):
-        with_fixture_for(job, todo)
+        with_fixture_for(NEST, product, 0, todo)
 
 
 def test_posture_that_a_fixture_cannot_hold_is_refused_before_any_trial() -> None:
-    config = CellConfig.load(overrides=["workcell.fixture=rigid_jig"])
     with pytest.raises(FixtureError, match="'motor' with -y up has no datum faces"):
-        check_fits(config, load_product("motor_unit"), POSTURES["motor/P1"])
+        check_fits(NEST, load_product("motor_unit"), POSTURES["motor/P1"])
 
 
 @pytest.mark.parametrize(

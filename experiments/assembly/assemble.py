@@ -40,7 +40,7 @@ def run_job(job: Job) -> int:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
         return 1
-    job = replace(job, config=with_fixture_for(job, todo))
+    job = replace(job, config=with_fixture_for(job.config, job.product, job.seed, todo))
     start = None if job.start is None else read_resumable(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:

@@ -9,26 +9,34 @@ import numpy as np
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.fixtures import fixture_class
-from experiments.assembly.job import Job
+from cell.products.product import Product
 from experiments.assembly.prepare import RunningCell
 from planning.operations.operation import Role, Step
 from planning.operations.pick_place.phases import can_place, yaws_to_place
 
 
-def with_fixture_for(job: Job, todo: Sequence[Step]) -> CellConfig:
-    """Return the job's configuration, with a custom fixture made for what the steps fix.
+def with_fixture_for(
+    config: CellConfig, product: Product, seed: int, todo: Sequence[Step]
+) -> CellConfig:
+    """Return a configuration with its custom fixture, if it has one, made for what the steps fix.
 
     It is turned on its base to the first yaw at which the planner can place the part and bring what
     comes later, unless the configuration states a yaw. If there is none it is not turned, and the
     run fails with the planner's evidence.
 
+    Args:
+        config: Of the cell.
+        product: That is assembled.
+        seed: Of the run.
+        todo: Its steps.
+
     Raises:
         InputError: The steps fix several parts: such a fixture holds one.
         FixtureError: No such fixture holds the part.
     """
-    name = job.config.workcell.fixture
+    name = config.workcell.fixture
     if not fixture_class(name).custom:
-        return job.config
+        return config
     fixed = tuple(dict.fromkeys(s.parts[0] for s in todo if s.operation.role is Role.FIX))
     if len(fixed) > 1:
         raise InputError(
@@ -36,14 +44,14 @@ def with_fixture_for(job: Job, todo: Sequence[Step]) -> CellConfig:
             "choose another --order, or --fixture soft_jig."
         )
     part = fixed[0]
-    config = job.config.with_changes({"custom.held.part": part, "custom.held.up": job.product.up})
+    config = config.with_changes({"custom.held.part": part, "custom.held.up": product.up})
     if config.custom.held.yaw_deg != 0.0:
         return config
-    looking = RunningCell(job.product, config, job.seed).station
+    looking = RunningCell(product, config, seed).station
     looking.look()
     for yaw in dict.fromkeys(yaws_to_place(looking, part)):
         turned = config.with_changes({"custom.held.yaw_deg": float(np.rad2deg(yaw))})
-        station = RunningCell(job.product, turned, job.seed).station
+        station = RunningCell(product, turned, seed).station
         station.look()
         if can_place(station, part):
             return turned
