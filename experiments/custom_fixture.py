@@ -23,10 +23,12 @@ from cell.errors import InputError
 from cell.fixtures import fixture_class
 from cell.fixtures.custom.fixture import CustomFixture
 from cell.fixtures.support_jig import SupportJig
+from cell.machines.cameras.rendering import rendering_problem
 from cell.products.loading import load_product
-from experiments.cli.common import Common, exit_code
+from experiments.cli.common import Common
+from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder, whole_file, write_json
-from experiments.reporting.render import View, rendering_problem, take_picture
+from experiments.reporting.render import View, take_picture
 
 LIFTED = 0.06  # Of the part in the first picture [m].
 

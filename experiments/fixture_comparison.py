@@ -28,7 +28,8 @@ from cell.fixtures.rigid_jig import RigidJig
 from cell.fixtures.support_jig import SupportJig
 from cell.products.loading import load_product
 from cell.products.product import Product
-from experiments.cli.common import Common, exit_code
+from experiments.cli.common import Common
+from experiments.cli.ending import exit_code
 from experiments.paper.cases import case_seed
 from experiments.paper.holding import Held, holding
 from experiments.paper.postures import POSTURES, Posture, chosen

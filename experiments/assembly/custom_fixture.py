@@ -35,9 +35,9 @@ def with_fixture_for(
         FixtureError: No such fixture holds the part.
     """
     name = config.workcell.fixture
-    if not fixture_class(name).custom:
-        return config
     fixed = tuple(dict.fromkeys(s.parts[0] for s in todo if s.operation.role is Role.FIX))
+    if not fixture_class(name).custom or not fixed:
+        return config
     if len(fixed) > 1:
         raise InputError(
             f"The plan fixes {', then '.join(fixed)}, and a {name} holds one part in one posture: "
