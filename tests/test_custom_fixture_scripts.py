@@ -54,7 +54,7 @@ def test_posture_that_a_fixture_cannot_hold_is_refused_before_any_trial() -> Non
 
 
 @pytest.mark.parametrize(
-    ("fixture", "case"), [("rigid_jig", "motor/P2"), ("support_jig", "plate/P1")]
+    ("fixture", "case"), [("rigid_jig", "plate/P1"), ("support_jig", "plate/P1")]
 )
 def test_exact_grasp_seats_the_part_to_within_its_play(fixture: str, case: str) -> None:
     config = CellConfig.load(overrides=[f"workcell.fixture={fixture}", *EXACT])

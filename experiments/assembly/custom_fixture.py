@@ -35,7 +35,7 @@ def with_fixture_for(
         FixtureError: No such fixture holds the part.
     """
     name = config.workcell.fixture
-    fixed = tuple(dict.fromkeys(s.parts[0] for s in todo if s.operation.role is Role.FIX))
+    fixed = list(dict.fromkeys(s.parts[0] for s in todo if s.operation.role is Role.FIX))
     if not fixture_class(name).custom or not fixed:
         return config
     if len(fixed) > 1:
