@@ -37,6 +37,7 @@ from cell.products.product import Product
 from cell.sleep import Sleep
 from cell.workpieces.parts import Parts, add_parts
 from cell.workpieces.threads import Threads, add_threads
+from cell.workpieces.work import fixture_work
 
 Extend = Callable[[MultibodyPlant, SceneGraph], None]
 
@@ -162,8 +163,8 @@ def add_cell(
             caller's own.
 
     Raises:
-        InputError: A product without simulation models, an unknown device or fixture, or systems
-            of the builder that have the cell's names already.
+        InputError: A product without simulation models, an unknown device or fixture, a part that
+            the fixture cannot hold, or systems of the builder that have the cell's names already.
     """
     product.check_simulable()
     prefix = f"{name}_" if name else ""
@@ -187,7 +188,8 @@ def add_cell(
     drivers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Driver)]
     threads = add_threads(plant, scene_graph, product, parts, next(iter(drivers), None))
     kind = config.workcell.fixture
-    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig)
+    work = fixture_work(config, product)
+    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig, work)
     for part in parts:
         fixture.add_part(plant, part.body, part.part.mesh)
     if extend is not None:

@@ -14,8 +14,9 @@ from cell.errors import InputError
 from cell.fixtures.soft_jig import JigParameters
 from cell.products.loading import load_product
 from cell.products.product import Product
+from cell.vectors import rotation_with_up
 from planning import plan
-from planning.feasibility.directions import DIRECTIONS, rotation_with_up, unit_vector
+from planning.feasibility.directions import DIRECTIONS, unit_vector
 from planning.feasibility.matrices import AssemblyMatrices
 from planning.fixture_analysis.candidate import Candidate, Choice, FixtureSetup
 from planning.fixture_analysis.capacity import (

@@ -27,7 +27,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "fixtures": {"contact"},
         "configuration": {"fixtures"},
         "machines": {"configuration", "fixtures"},
-        "workpieces": {"machines", "products"},
+        "workpieces": {"configuration", "fixtures", "machines", "products"},
         "ports": {"workpieces"},
         "link_policy": {"contact", "fixtures", "machines", "workpieces"},
         "cad": {"fixtures", "machines", "products"},

@@ -192,6 +192,5 @@ def test_wilson_interval_of_five_out_of_five() -> None:
 
 def test_part_wider_than_the_bag_is_refused() -> None:
     config = CellConfig.load("default", ["jig.bag.cap_height=0.005"])
-    part = load_product("motor_unit").parts["plate"]
     with pytest.raises(BadPart, match="70 mm wide"):
-        check_fits(config, part, POSTURES["plate/P1"])
+        check_fits(config, load_product("motor_unit"), POSTURES["plate/P1"])

@@ -30,6 +30,7 @@ from cell.configuration.machines import (
     WorkcellConfig,
 )
 from cell.configuration.sections import changed
+from cell.fixtures.custom.parameters import CustomParameters
 from cell.fixtures.soft_jig.parameters import JigParameters
 
 
@@ -49,6 +50,7 @@ class CellConfig:
     workcell: WorkcellConfig = WorkcellConfig()
     driver: DriverConfig = DriverConfig()
     jig: JigParameters = JigParameters()
+    custom: CustomParameters = CustomParameters()
     placement: PlacementConfig = PlacementConfig()
     push: PushConfig = PushConfig()
     motion: MotionConfig = MotionConfig()

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 from rich.console import Console
 
 from cell.errors import InputError
+from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.film import Film
 from experiments.assembly.films import write_films
 from experiments.assembly.job import Job
@@ -49,6 +51,7 @@ def run_job(job: Job) -> int:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
         return 1
+    job = replace(job, config=with_fixture_for(job.config, job.product, job.seed, todo))
     start = None if job.start is None else read_resumable(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from cell.products.loading import load_product
+from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.resume import failed_state, resumable_state
 from experiments.assembly.run import Run, StepResult
@@ -36,7 +37,8 @@ def assemble(task: Task, *, order: str = "", last: str = "") -> Outcome:
         todo = _up_to(steps(product, fixing), last)
     except NoOperation as reason:
         return Outcome(False, phase="plan", evidence=str(reason))
-    run = Run(RunningCell(product, task.config, task.seed))
+    config = with_fixture_for(task.config, product, task.seed, todo)
+    run = Run(RunningCell(product, config, task.seed))
     before = _BeforeStep(run)
     run.watchers = (before,)
     run.run(todo)

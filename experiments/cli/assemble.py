@@ -27,7 +27,7 @@ class Assemble:
     """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
 
     fixture: Annotated[str | None, arg(metavar="NAME")] = None
-    """What holds the parts: soft_jig, flat_plate. Default: workcell.fixture."""
+    """soft_jig, rigid_jig, support_jig or flat_plate. Default: workcell.fixture."""
 
     start: Annotated[Path | None, arg(metavar="STATE.npz")] = None
     """Go on from state.npz or failed_state.npz of a run with the same product, order and seed."""

@@ -21,7 +21,7 @@ class Check:
     """Assembly order: parts or groups, separated by commas. Default: the product's first one."""
 
     fixture: Annotated[str | None, arg(metavar="NAME")] = None
-    """What holds the parts: soft_jig, flat_plate. Default: workcell.fixture."""
+    """soft_jig, rigid_jig, support_jig or flat_plate. Default: workcell.fixture."""
 
     allow_outside: bool = False
     """Let the product use models outside of the folder of its file."""

@@ -31,7 +31,7 @@ class Place:
     """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
 
     fixture: Annotated[str | None, arg(metavar="NAME")] = None
-    """What the part is put on: soft_jig, flat_plate. Default: workcell.fixture."""
+    """soft_jig, rigid_jig, support_jig or flat_plate. Default: workcell.fixture."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
@@ -60,7 +60,7 @@ class Push:
     """Vacuum in the bag [kPa]; 0 leaves it soft. Default: jig.vacuum.pressure."""
 
     fixture: Annotated[str | None, arg(metavar="NAME")] = None
-    """What the part is put on: soft_jig, flat_plate. Default: workcell.fixture."""
+    """soft_jig, rigid_jig, support_jig or flat_plate. Default: workcell.fixture."""
 
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 

@@ -55,9 +55,9 @@ def run_experiment(experiment: Experiment, label: str | None) -> int:
         0 if every case came out as expected, else 1; 3 if a trial came to no verdict.
     """
     cases = cases_of(experiment.command, label)
-    parts = load_product(PRODUCT).parts
+    product = load_product(PRODUCT)
     for case in cases:
-        check_fits(experiment.config, parts[case.posture.part], case.posture)
+        check_fits(experiment.config, product, case.posture)
     console = Console(quiet=experiment.quiet, highlight=False)
     done: list[Row] = []
 

@@ -16,7 +16,14 @@ from experiments.paper.rest import Rest
 from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation
 from experiments.paper.rig.stage import Observer
-from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
+from experiments.paper.trial import (
+    HOVER,
+    READY_TIME,
+    TrialDisturbance,
+    gripped,
+    held,
+    planned_pose,
+)
 from experiments.speed.meter import Meter
 from planning.operations.grasping import CLEAR, CLEARANCE, tip_opening
 from planning.operations.pick_place.phases import DEEPEST
@@ -52,13 +59,14 @@ class RigBench:
 
     @staticmethod
     def build(config: CellConfig, product: Product, posture: Posture) -> RigBench:
-        """Build the rig for the part of a posture."""
+        """Build the rig for the part of a posture, with a fixture that takes it in this posture."""
+        config, product = held(config, posture), gripped(product, posture)
         return RigBench(build_push_rig(config, product, posture.part), posture)
 
     def begin(self, disturbance: TrialDisturbance) -> RigHand:
         """Set up a trial: the part on a stand over the jig, the open hand around it."""
-        config, X_WJ = self.rig.config, self.rig.config.workcell.X_WJ
-        height = config.jig.bag.cap_height + HOVER
+        X_WJ = self.rig.config.workcell.X_WJ
+        height = self.rig.fixture.entry_height + HOVER
         X_WP = planned_pose(self.rig.part.part, self.posture, X_WJ, height)
         simulation = RigSimulation(
             self.rig,

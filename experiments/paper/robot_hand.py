@@ -27,7 +27,14 @@ from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rest import Rest
 from experiments.paper.rig.stage import Observer, Stage
-from experiments.paper.trial import HOVER, READY_TIME, TrialDisturbance, planned_pose
+from experiments.paper.trial import (
+    HOVER,
+    READY_TIME,
+    TrialDisturbance,
+    gripped,
+    held,
+    planned_pose,
+)
 from experiments.speed.meter import Meter
 from planning.operations.grasping import HandPhase
 from planning.operations.phase_class import class_of
@@ -88,10 +95,11 @@ class DrawnSource:
 
 def presented(product: Product, posture: Posture) -> Product:
     """Return the product reduced to the posture's part, in the tray as the posture asks."""
-    part = product.parts[posture.part]
+    alone = gripped(product, posture)
+    part = alone.parts[posture.part]
     assert part.X_TrayP is not None
-    part = replace(part, X_TrayP=part.X_TrayP @ posture.X_PTurned, grasps=(posture.grasp,))
-    return replace(product, parts={part.name: part}, groups={}, joints=())
+    part = replace(part, X_TrayP=part.X_TrayP @ posture.X_PTurned)
+    return replace(alone, parts={part.name: part})
 
 
 @dataclass(frozen=True)
@@ -115,7 +123,7 @@ class RobotBench:
         config: CellConfig, product: Product, posture: Posture, push: PushSpec | None
     ) -> RobotBench:
         """Build it."""
-        config = replace(config, workcell=replace(config.workcell, jig_base_fixed=False))
+        config = held(config, posture).with_changes({"workcell.jig_base_fixed": False})
         cell = build_cell(config, presented(product, posture))
         return RobotBench(cell, _stage(cell, posture.part), posture, push)
 

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
-from typing import Protocol
+from dataclasses import dataclass, field, replace
+from typing import Protocol, cast
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.configuration.config import CellConfig
 from cell.errors import BadPart
-from cell.products.product import Part
+from cell.fixtures import fixture_class
+from cell.fixtures.custom.fixture import CustomFixture
+from cell.products.product import Part, Product
 from cell.simulation.phase import PhaseFailed
 from cell.simulation.state import State
+from cell.workpieces.work import fixture_work
 from experiments.paper.postures import Posture, PushSpec
 from experiments.paper.push_rule import push_line
 from experiments.paper.rig.stage import Observer
@@ -85,7 +88,7 @@ class Hand(Protocol):
 
     @property
     def planned(self) -> RigidTransform:
-        """Nominal X_JP over the jig, with the lowest point `HOVER` above the bag."""
+        """Nominal X_JP over the jig, with the lowest point `HOVER` above the fixture."""
         ...
 
     @property
@@ -141,6 +144,7 @@ class TrialRecord:
 
     Attributes:
         planned: Nominal X_JP of the part over the jig, before it is pressed in.
+        seat: X_JP in which a fixture made for it holds the part; None for other fixtures.
         held: X_JP in the grasp when the bag has frozen.
         placed: X_JP after the hand has left.
         speed: Of the part at that time [m/s].
@@ -155,6 +159,7 @@ class TrialRecord:
     """
 
     planned: RigidTransform
+    seat: RigidTransform | None = None
     held: RigidTransform | None = None
     placed: RigidTransform | None = None
     speed: float = 0.0
@@ -189,8 +194,28 @@ def planned_pose(
     return RigidTransform(R_WP, X_WJ.translation() + offset)
 
 
-def check_fits(config: CellConfig, part: Part, posture: Posture) -> None:
-    """Raise `BadPart` for a part that is wider than the bag."""
+def held(config: CellConfig, posture: Posture) -> CellConfig:
+    """Return the configuration for a fixture that is made for a posture, if it is of that kind."""
+    return config.with_changes({"custom.held.part": posture.part, "custom.held.up": posture.up})
+
+
+def gripped(product: Product, posture: Posture) -> Product:
+    """Return the product reduced to the posture's part and its grasp."""
+    part = replace(product.parts[posture.part], grasps=(posture.grasp,))
+    return replace(product, parts={part.name: part}, groups={}, orders=(), joints=())
+
+
+def check_fits(config: CellConfig, product: Product, posture: Posture) -> None:
+    """Raise an error for a part that the fixture cannot hold in a posture.
+
+    Raises:
+        BadPart: It is wider than the bag.
+        FixtureError: A fixture cannot be made for it.
+    """
+    if work := fixture_work(held(config, posture), gripped(product, posture)):
+        cast(type[CustomFixture], fixture_class(config.workcell.fixture)).check(work)
+        return
+    part = product.parts[posture.part]
     R_WP = upright(posture.up, 0.0)
     size = np.ptp(part.mesh.vertices @ R_WP.matrix().T, axis=0)
     aperture = 2 * config.jig.bag.aperture_radius
@@ -217,7 +242,8 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
         push: The push; None only places the part.
         watch: Called at the events "placed", "before", "after" and "end".
     """
-    trial, observer = TrialRecord(planned=hand.planned), hand.observer
+    observer, stage = hand.observer, hand.observer.stage
+    trial = TrialRecord(hand.planned, stage.fixture.seat(stage.part.part.name))
     try:
         hand.press()
         trial.planned, trial.held = hand.planned, observer.X_JP

@@ -44,7 +44,7 @@ def tilt_between(X_JA: RigidTransform, X_JB: RigidTransform) -> float:
 
 
 def measure_place(trial: TrialRecord) -> Measured:
-    """Return depth, offset, tilt and speed of the released part, and the peak press forces."""
+    """Return pose and speed of the released part, its error on a seat, and peak press forces."""
     measured: Measured = {}
     if trial.placed is not None:
         drop = trial.planned.translation() - trial.placed.translation()
@@ -52,6 +52,10 @@ def measure_place(trial: TrialRecord) -> Measured:
         measured["offset_m"] = float(np.hypot(*drop[:2]))
         measured["tilt_rad"] = tilt_between(trial.planned, trial.placed)
         measured["speed_m_per_s"] = trial.speed
+        if trial.seat is not None:
+            off = trial.placed.translation() - trial.seat.translation()
+            measured["seat_error_m"] = float(np.linalg.norm(off))
+            measured["seat_error_rad"] = angle_between(trial.seat, trial.placed)
     if trial.held is not None and trial.placed is not None:
         shift = trial.placed.translation() - trial.held.translation()
         measured["release_shift_m"] = float(np.linalg.norm(shift))

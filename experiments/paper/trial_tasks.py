@@ -67,7 +67,7 @@ def _trial(command: str, task: Task, label: str, hand: str, number: int, timed: 
     product = load_product(task.product)
     if case.posture.part not in product.parts:
         raise UnknownName("part", case.posture.part, product.parts)
-    check_fits(task.config, product.parts[case.posture.part], case.posture)
+    check_fits(task.config, product, case.posture)
     bench: Bench
     if hand == "robot":
         bench = RobotBench.build(task.config, product, case.posture, case.push)

@@ -11,10 +11,11 @@ from pydrake.math import RigidTransform
 
 from cell.fixtures.soft_jig import BagParameters
 from cell.products.product import Product
+from cell.vectors import rotation_with_up
 from experiments.plan.drawn import Body, DrawnProduct, Shape, box
 from experiments.plan.scene import Color, SceneItem
 from planning.feasibility.algorithm import FixingStep
-from planning.feasibility.directions import opposite, rotation_with_up
+from planning.feasibility.directions import opposite
 
 MOVED: Color = (0.93, 0.52, 0.13)
 ARROW: Color = (0.80, 0.10, 0.12)

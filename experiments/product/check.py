@@ -8,6 +8,7 @@ from rich.console import Console
 
 from cell.configuration.config import CellConfig
 from cell.products.product import Product
+from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
 from planning.product_check.check import machine_findings, plan_findings, simulated_findings
 from planning.product_check.finding import Level
@@ -27,7 +28,7 @@ def run_check(
     found = list(machine_findings(product, config))
     planned, todo = plan_findings(product, order, config)
     found += planned
-    running = RunningCell(product, config, seed)
+    running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
     found += simulated_findings(running.simulation, running.station, todo)
     levels = list(Level)
     for finding in sorted(found, key=lambda finding: levels.index(finding.level)):

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Mapping
 
 import numpy as np
-from pydrake.math import RotationMatrix
 
 DIRECTIONS = ("+x", "-x", "+y", "-y", "+z", "-z")
 
@@ -25,19 +24,6 @@ def unit_vector(direction: str) -> np.ndarray:
     vector = np.zeros(3)
     vector[axis_index(direction)] = 1.0 if direction[0] == "+" else -1.0
     return vector
-
-
-def rotation_with_up(up: str) -> RotationMatrix:
-    """Return R_JA that turns the product so that its axis ``up`` points along +z of the jig.
-
-    The product's x axis stays along that of the jig; if ``up`` is along x, its y axis points along
-    the jig's x. Compose with a rotation about z for another yaw.
-    """
-    axis = unit_vector(up)
-    if up == "-z":
-        return RotationMatrix.MakeXRotation(np.pi)
-    x = unit_vector("+x") if axis_index(up) != 0 else unit_vector("+y")
-    return RotationMatrix(np.stack([x, np.cross(axis, x), axis]))  # Rows: axes of J in A.
 
 
 def open_directions(directions: Mapping[str, int]) -> list[str]:

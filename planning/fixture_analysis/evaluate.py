@@ -8,7 +8,8 @@ from functools import cached_property
 import numpy as np
 
 from cell.products.product import Product
-from planning.feasibility.directions import axis_index, rotation_with_up, unit_vector
+from cell.vectors import rotation_with_up
+from planning.feasibility.directions import axis_index, unit_vector
 from planning.feasibility.matrices import AssemblyMatrices
 from planning.feasibility.solids import combined_cog
 from planning.fixture_analysis.candidate import Candidate, FixtureSetup, Proposal

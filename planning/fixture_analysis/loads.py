@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.products.product import Product
-from planning.feasibility.directions import rotation_with_up, unit_vector
+from cell.vectors import rotation_with_up
+from planning.feasibility.directions import unit_vector
 from planning.feasibility.solids import Solid
 from planning.fixture_analysis.candidate import FixtureSetup, Proposal
 

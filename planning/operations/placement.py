@@ -11,12 +11,14 @@ from collections.abc import Callable, Iterator
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cell.fixtures.base import FixtureError
 from cell.machines.arm import Unreachable
 from cell.products.joints import Fit, Rest
 from cell.products.product import Product
-from planning.feasibility.directions import rotation_with_up, unit_vector
+from cell.vectors import rotation_with_up
+from planning.feasibility.directions import unit_vector
 from planning.motion.paths import NoPath, plan_line
-from planning.operations.grasping import Reach, backed_off
+from planning.operations.grasping import Reach, backed_off, raised
 from planning.operations.station import Placement, Station
 
 YAWS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
@@ -24,6 +26,7 @@ RETREAT = 0.08  # The hand backs off this far when it has let go [m] [A].
 HOVER = 0.008  # The part waits this far above the fixture before it is pressed in [m] [A].
 # Depth at which later grasps are checked; 20 N press the motor in by 5 to 10 mm [M].
 LIKELY_DEPTH = 0.007
+SAME_POSTURE = 0.9999  # Cosine of 0.8 degrees.
 
 Suits = Callable[[RigidTransform], bool]  # Of a pose X_WP on the fixture.
 
@@ -96,26 +99,61 @@ def choose_placement(
         suits: Whether the pose X_WP of the seated part suits whatever else comes later.
     """
     top = station.cell.fixture.entry_height
-    for yaw, X_WP, q in _placeable(station, part, up, reach, top + HOVER):
-        seated = pose_on_jig(station, part, up, yaw, top - LIKELY_DEPTH)
-        X_WA = seated @ station.part(part).X_AP.inverse()
-        leaves = _leaves(station, reach, seated @ reach.grasp.X_PJaw, q)
+    yaws = _yaws(station, part, up)
+    for yaw, X_WP, q in _placeable(station, part, up, reach, top + HOVER, yaws):
+        X_WSeated = seated(station, part, X_WP)
+        X_WA = X_WSeated @ station.part(part).X_AP.inverse()
+        leaves = _leaves(station, reach, X_WSeated @ reach.grasp.X_PJaw, q)
         mates = all(_mates(station, name, X_WA) for name in later)
-        if leaves and mates and suits(seated):
+        if leaves and mates and suits(X_WSeated):
             return Placement(yaw, X_WP, q)
     X_WJaw = pose_on_jig(station, part, up, 0.0, top + HOVER) @ reach.grasp.X_PJaw
     raise Unreachable(station.holder.name, reach.grasp.jaw, X_WJaw, f"no yaw suits '{part}'")
 
 
+def _yaws(station: Station, part: str, up: str) -> np.ndarray:
+    """Return the yaws [rad] at which the fixture takes a part.
+
+    Raises:
+        FixtureError: It does not take the part, or not in this posture.
+    """
+    fixture = station.cell.fixture
+    X_JP = fixture.seat(part)
+    if X_JP is None:
+        return YAWS
+    R_JA = X_JP.rotation() @ station.part(part).X_AP.rotation().inverse()
+    R_turn = (R_JA @ upright(up, 0.0).inverse()).matrix()
+    if R_turn[2, 2] < SAME_POSTURE:
+        raise FixtureError(f"The {fixture.name} does not hold '{part}' with {up} up.")
+    return np.array([np.arctan2(R_turn[1, 0], R_turn[0, 0])])
+
+
+def seated(station: Station, part: str, X_WP: RigidTransform) -> RigidTransform:
+    """Return where a part that hovers at X_WP comes to lie."""
+    X_JP = station.cell.fixture.seat(part)
+    if X_JP is None:
+        return raised(X_WP, -(HOVER + LIKELY_DEPTH))
+    return station.cell.X_WJ @ X_JP
+
+
+def reachable_yaws(station: Station, part: str, up: str, reach: Reach) -> list[float]:
+    """Return the yaws of a part over the fixture that the hand reaches, least turned first.
+
+    They are those at which a fixture that is made for the part may be set up.
+    """
+    height = station.cell.fixture.entry_height + HOVER
+    return [yaw for yaw, _, _ in _placeable(station, part, up, reach, height, YAWS)]
+
+
 def _placeable(
-    station: Station, part: str, up: str, reach: Reach, height: float
+    station: Station, part: str, up: str, reach: Reach, height: float, yaws: np.ndarray
 ) -> Iterator[tuple[float, RigidTransform, np.ndarray]]:
     """Yield yaw, X_WP and joint angles (n,) with the part over the fixture, least turned first."""
     arm, hand = station.holder, station.hand
     frame, near = arm.frame(reach.grasp.jaw), reach.q_before
     may_touch = [("held", "*"), (hand, "held"), (hand, part)]
     found = []
-    for yaw in YAWS:
+    for yaw in yaws:
         X_WP = pose_on_jig(station, part, up, yaw, height)
         X_WJaw = X_WP @ reach.grasp.X_PJaw
         for q in station.configurations(arm, frame, X_WJaw, near, may_touch)[:1]:

@@ -19,8 +19,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from cell.vectors import rotation_with_up
 from planning.feasibility.algorithm import choose_posture, open_postures
-from planning.feasibility.directions import DIRECTIONS, opposite, rotation_with_up
+from planning.feasibility.directions import DIRECTIONS, opposite
 from planning.feasibility.slanted import Slanted
 from planning.feasibility.solids import Solid
 from planning.fixture_analysis.candidate import FixtureSetup

@@ -17,7 +17,7 @@ from cell.cad.screw_model import screw_model
 from cell.cad.sdf import Model, Visual, mesh_inertia, write_model
 from cell.products.model_files import OWN_MODELS
 from cell.products.product import Part, Product
-from planning.feasibility.directions import rotation_with_up
+from cell.vectors import rotation_with_up
 from planning.product_draft.contact_models import bearing_radius
 from planning.product_draft.joint_guesses import ScrewGuess
 from planning.product_draft.recognised import Recognised

@@ -39,6 +39,7 @@ from cell.paths import model_url, new_parser
 from cell.products.product import Product
 from cell.sleep import Sleep
 from cell.workpieces.parts import add_parts
+from cell.workpieces.work import fixture_work
 from experiments.paper.rig.stage import Stage
 
 # Drives of the carriage: stiffness, damping and largest effort; slides [N/m, N s/m, N], turn and
@@ -154,7 +155,8 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     alone = replace(product, parts={part: product.parts[part]}, joints=())
     (loose,) = add_parts(plant, alone, config.workcell.X_WT)
     kind = config.workcell.fixture
-    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig)
+    work = fixture_work(config, alone, HAND_E)
+    fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig, work)
     fixture.add_part(plant, loose.body, loose.part.mesh)
     wrist, hand = _add_carriage(plant)
     gripper = Gripper.add(plant, hand, "gripper", HAND_E, jaws)

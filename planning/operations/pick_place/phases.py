@@ -28,14 +28,14 @@ from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.placement import (
     HOVER,
-    LIKELY_DEPTH,
     RETREAT,
     Placement,
     Suits,
     anywhere,
     brought_to,
     choose_placement,
-    pose_on_jig,
+    reachable_yaws,
+    seated,
 )
 from planning.operations.station import FIXTURE, Station
 from planning.operations.waiting import steady_wrist
@@ -76,11 +76,25 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
     (part,) = step.parts
     product = station.cell.product
     _, placement = _choose(station, part, product.up, brought_to(product, part), anywhere)
-    height = station.cell.fixture.entry_height - LIKELY_DEPTH
-    seated = pose_on_jig(station, part, product.up, placement.yaw, height)
     station.origins[part] = station.pose_of(part)
-    station.belief.suppose(part, seated)
+    station.belief.suppose(part, seated(station, part, placement.X_WP))
     return ()
+
+
+def yaws_to_place(station: Station, part: str) -> Iterator[float]:
+    """Yield the yaws at which the hand reaches over the fixture, by grasp, least turned first."""
+    for reach in _top_first(station, part, station.pose_of(part)):
+        yield from reachable_yaws(station, part, station.cell.product.up, reach)
+
+
+def can_place(station: Station, part: str) -> bool:
+    """Return whether a part can be put on the fixture, and later parts be brought to it there."""
+    product = station.cell.product
+    try:
+        _choose(station, part, product.up, brought_to(product, part), anywhere)
+    except Unreachable:
+        return False
+    return True
 
 
 def pick_place(

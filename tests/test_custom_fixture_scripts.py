@@ -1,0 +1,102 @@
+"""Assembly on a fixture made for a part, and the scripts about such fixtures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from cell import CellConfig, load_product
+from cell.errors import InputError
+from cell.fixtures.base import FixtureError
+from experiments.assembly.custom_fixture import with_fixture_for
+from experiments.custom_fixture import main as write_fixture
+from experiments.fixture_comparison import main as compare_fixtures
+from experiments.paper.postures import POSTURES
+from experiments.paper.rig_hand import RigBench
+from experiments.paper.trial import TrialDisturbance, check_fits, run_trial
+from experiments.paper.trial_metrics import measure_place
+from planning.assembly_plan.planner import plan
+from planning.operations.sequence import steps
+
+EXACT = [
+    "push.grasp_position_sigma=0",
+    "push.grasp_angle_sigma_deg=0",
+    "push.jig_position_sigma=0",
+]
+
+
+NEST = CellConfig.load(overrides=["workcell.fixture=rigid_jig"])
+
+
+def test_assembly_has_its_fixture_made_for_what_the_plan_fixes() -> None:
+    product, turned = load_product("motor_unit"), NEST.with_changes({"custom.held.yaw_deg": 45.0})
+    todo = steps(product, plan(product))
+    held = with_fixture_for(turned, product, 0, todo).custom.held
+    assert (held.part, held.up, held.yaw_deg) == ("motor", "+z", 45.0)
+    soft = CellConfig()
+    assert with_fixture_for(soft, product, 0, todo) is soft
+
+
+def test_plan_that_fixes_two_parts_is_refused() -> None:
+    product = load_product("motor_unit")
+    todo = steps(product, plan(product, ("plate", "bolts", "motor")))
+    with pytest.raises(InputError, match="fixes plate, then motor, and a rigid_jig holds one part"):
+        with_fixture_for(NEST, product, 0, todo)
+
+
+def test_posture_that_a_fixture_cannot_hold_is_refused_before_any_trial() -> None:
+    with pytest.raises(FixtureError, match="'motor' with -y up has no datum faces"):
+        check_fits(NEST, load_product("motor_unit"), POSTURES["motor/P1"])
+
+
+@pytest.mark.parametrize(
+    ("fixture", "case"), [("rigid_jig", "plate/P1"), ("support_jig", "plate/P1")]
+)
+def test_exact_grasp_seats_the_part_to_within_its_play(fixture: str, case: str) -> None:
+    config = CellConfig.load(overrides=[f"workcell.fixture={fixture}", *EXACT])
+    bench = RigBench.build(config, load_product("motor_unit"), POSTURES[case])
+    trial = run_trial(bench.begin(TrialDisturbance.draw(config, np.random.default_rng(0))), None)
+    measured = measure_place(trial)
+    assert trial.failure is None
+    assert measured["seat_error_m"] < 1e-4
+    assert measured["seat_error_rad"] < 1e-3
+
+
+def test_script_writes_what_has_to_be_made(tmp_path: Path) -> None:
+    arguments = ["--part", "plate", "--up=-z", "--quiet", "--out", str(tmp_path)]
+    assert write_fixture([*arguments, "--fixture", "support_jig"]) == 0
+    found = json.loads((tmp_path / "fixture.json").read_text())
+    assert (found["part"], len(found["supports_mm"])) == ("plate", 3)
+    assert {post["side"] for post in found["posts"]} == {"+x", "-x", "+y", "-y"}
+    assert write_fixture(arguments) == 0
+    block = trimesh.load_mesh(tmp_path / "rigid_jig.stl")
+    assert block.is_watertight
+    assert 80.0 < block.extents.max() < 160.0  # In mm.
+
+
+def test_scripts_refuse_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = ["--out", str(tmp_path / "new")]
+    assert write_fixture(["--fixture", "soft_jig", *out]) == 2
+    assert "takes any part" in capsys.readouterr().err
+    assert write_fixture(["--part", "wheel", *out]) == 2
+    assert "Known: bolt_1" in capsys.readouterr().err
+    assert compare_fixtures(["--case", "motor/P9", *out]) == 2
+    assert not (tmp_path / "new").exists()
+
+
+@pytest.mark.slow
+def test_comparison_of_one_posture(tmp_path: Path) -> None:
+    arguments = ["--case", "plate/P1", "--trials", "1", "--quiet", "--out", str(tmp_path)]
+    assert compare_fixtures(arguments) == 0
+    rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
+    soft, posts, nest = rows
+    assert [row["refused"] for row in rows] == ["", "", ""]
+    assert soft["holds"]["force +z"]["load"] > 3 * nest["holds"]["force +z"]["load"]
+    # The weight, 0.68 N, and what a stalled wall adds.
+    for rigid in (posts, nest):
+        assert 0.5 < rigid["holds"]["force +z"]["load"] < 2.0
+        assert rigid["holds"]["force +y"]["load"] > soft["holds"]["force +y"]["load"] / 3
