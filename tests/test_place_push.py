@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from cell import CellConfig
 from cell.simulation.log import Log
 from experiments.cli.main import main
+from experiments.paper import place_push
 from experiments.paper.case_results import Experiment, by_outcome, verdict
 from experiments.paper.cases import Case, CaseResult, TrialResult, judged
 from experiments.paper.place_push import run_experiment
@@ -85,6 +86,30 @@ def test_part_that_falls_over_is_a_failure_with_a_full_report(tmp_path: Path) ->
     assert case["measured"]["tilt_rad"] > 0.5
     assert result["real_time_factor"] > 0
     assert "force plate" in (tmp_path / "report.html").read_text()
+    (state,) = tmp_path.glob("trials/*/failed_state.npz")
+    with np.load(state) as arrays:
+        assert float(arrays["time"]) > 0.0
+        assert np.isfinite(arrays["q"]).all() and np.isfinite(arrays["v"]).all()
+
+
+@pytest.mark.parametrize(
+    ("error", "said"), [(KeyboardInterrupt, "interrupted"), (OSError, "error")]
+)
+def test_result_says_that_the_trials_run_and_why_they_ended(
+    error: type[BaseException], said: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    seen = []
+
+    def stop(*_: object, **__: object) -> None:
+        seen.append(json.loads((tmp_path / "result.json").read_text()))
+        raise error
+
+    monkeypatch.setattr(place_push, "run_campaign", stop)
+    experiment = Experiment("place", CellConfig(), "rig", 1, 0, tmp_path, quiet=True)
+    with pytest.raises(error):
+        run_experiment(experiment, "motor/P2")
+    assert (seen[0]["verdict"], seen[0]["cases"]) == ("running", [])
+    assert json.loads((tmp_path / "result.json").read_text())["verdict"] == said
 
 
 def case_with(label: str, displacements: list[float]) -> CaseResult:

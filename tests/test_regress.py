@@ -55,12 +55,12 @@ def stored_in(tmp_path: Path) -> Mapping[str, Any]:
 
 
 def test_beginning_of_a_name_selects_all_cases_that_begin_with_its_words() -> None:
-    assert cases_named(["push/plate/P2", "hold/standing"]) == (
+    assert cases_named(["push/plate/P2", "hold/standing"], NAMES) == (
         "push/plate/P2/a", "push/plate/P2/b", "push/plate/P2/c", "hold/standing",
     )  # fmt: skip
-    assert cases_named(["place", "push", "hold"]) == NAMES
+    assert cases_named(["place", "push", "hold"], NAMES) == NAMES
     with pytest.raises(InputError, match="No case 'push/pl'. Known: place/motor/P1,"):
-        cases_named(["push/pl"])
+        cases_named(["push/pl"], NAMES)
 
 
 def test_every_case_has_trials_and_the_package_stores_the_cases_of_its_suites() -> None:
@@ -122,7 +122,7 @@ def test_case_that_is_not_stored_is_named_before_any_work(
     assert regress(tmp_path, "--case", "hold/standing", "--update") == 0
     (tmp_path / "out" / "result.json").unlink()
     assert regress(tmp_path, "--case", "push/plate/P1/a") == 2
-    assert "Of case 'push/plate/P1/a' nothing is stored" in capsys.readouterr().err
+    assert "No case 'push/plate/P1/a'. Known: hold/standing." in capsys.readouterr().err
     assert not (tmp_path / "out" / "result.json").exists()
 
 

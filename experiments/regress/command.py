@@ -21,7 +21,6 @@ from rich.console import Console
 from rich.table import Table
 
 from cell.configuration.config import CellConfig
-from cell.errors import InputError
 from cell.paths import MODELS
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.trial import Row
@@ -35,7 +34,7 @@ from experiments.compare.comparison import (
 from experiments.compare.files import check_files, write_csv, write_junit
 from experiments.paper.place_push import timed
 from experiments.regress.baseline import Baseline, Metrics, Ratios, metrics_of, read_baseline
-from experiments.regress.suites import SEED, SUITES, Suite, cases_named, trials_of
+from experiments.regress.suites import NAMES, SEED, SUITES, Suite, cases_named, trials_of
 from experiments.reporting.output import write_json
 from experiments.reporting.provenance import finite, versions
 from experiments.reporting.result_file import ResultFile
@@ -89,12 +88,13 @@ class Regression:
         files = {"junit": options.get("junit"), "csv": options.get("csv")}
         check_files(**files, baseline=path if update else None)
         stored = None if update and not path.exists() else read_baseline(path)
+        if stored is not None:
+            cases_named(tuple(stored.cases), NAMES)
         names, trials = SUITES[suite].cases, SUITES[suite].trials
         if baseline is not None and stored is not None:
             names, trials = tuple(stored.cases), stored.trials
-        chosen = cases_named(cases or names)
-        if stored is not None and not update:
-            check_stored(chosen, stored, path)
+        known = NAMES if stored is None or update else tuple(stored.cases)
+        chosen = cases_named(cases, known) if cases else names
         return Regression(Suite(chosen, trials), stored, path, update, **options)
 
     def run(self, out: Path) -> int:
@@ -127,10 +127,8 @@ class Regression:
                 if not row.done
             }
             now = {case: metrics_of(rows) for case, rows in found.items() if case not in errors}
-            timed_rows = [
-                row for rows in found.values() for row in rows if row.options.get("timed")
-            ]
-            speed = ratios(timed(row, out) for row in timed_rows if row.done)
+            ended = [row for rows in found.values() for row in rows if row.done]
+            speed = ratios(timed(row, out) for row in ended if row.options.get("timed"))
             return self._conclude(result, console, now, speed, errors)
 
     def _tell_versions(self, console: Console) -> None:
@@ -167,10 +165,11 @@ class Regression:
         warnings = [] if self.update else speed_warnings(stored.speed, speed)
         for warning in warnings:
             console.print(warning, markup=False, soft_wrap=True)
+        held = compared(now, now) if self.update else rows  # What is stored is what holds.
         if self.junit is not None:
-            write_junit(self.junit, "regress", rows, errors)
+            write_junit(self.junit, "regress", held, errors)
         if self.csv is not None:
-            write_csv(self.csv, rows, ("stored", "now"))
+            write_csv(self.csv, held, ("stored", "now"))
         if self.update and not errors:
             whole = set(now) >= set(stored.cases)
             kept = Baseline(
@@ -179,6 +178,7 @@ class Regression:
                 self.suite.trials,
                 speed if whole else stored.speed,
             )
+            self.path.parent.mkdir(parents=True, exist_ok=True)
             write_json(self.path, {"seed": SEED, **kept.to_dict()})
         good = self.update or all(row.ok for row in rows)
         verdict = "error" if errors else "success" if good else "failure"
@@ -201,17 +201,6 @@ class Regression:
             console.print(value_table(rows, "Drift", names, "drift"))
             console.print(tolerance_table(rows))
         console.print(speed_table(stored.speed, speed))
-
-
-def check_stored(cases: Sequence[str], stored: Baseline, path: Path) -> None:
-    """Raise `InputError` for the first case of which nothing is stored."""
-    for case in cases:
-        if case not in stored.cases:
-            known = ", ".join(stored.cases)
-            raise InputError(
-                f"Of case '{case}' nothing is stored in '{path}'; it holds {known}. "
-                "Store it with --update."
-            )
 
 
 def metrics_to_json(rows: Sequence[Comparison]) -> list[dict[str, Any]]:

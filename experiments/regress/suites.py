@@ -43,17 +43,21 @@ QUICK = (
 SUITES = {"quick": Suite(QUICK, 1), "full": Suite(NAMES, 3)}
 
 
-def cases_named(wanted: Sequence[str]) -> tuple[str, ...]:
+def cases_named(wanted: Sequence[str], known: Sequence[str]) -> tuple[str, ...]:
     """Return the cases that names select: of a case, or its first words, as ``push/motor``.
+
+    Args:
+        wanted: What selects them.
+        known: The cases that there are: all, or those of which something is stored.
 
     Raises:
         InputError: A name selects none.
     """
     found: list[str] = []
     for name in wanted:
-        cases = [case for case in NAMES if f"{case}/".startswith(f"{name.rstrip('/')}/")]
+        cases = [case for case in known if f"{case}/".startswith(f"{name.rstrip('/')}/")]
         if not cases:
-            raise InputError(f"No case '{name}'. Known: {', '.join(NAMES)}, and their beginnings.")
+            raise InputError(f"No case '{name}'. Known: {', '.join(known)}.")
         found += cases
     return tuple(dict.fromkeys(found))
 
