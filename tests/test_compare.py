@@ -10,12 +10,11 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-import campaign_experiments as experiments
 import pytest
 
 from cell.products.loading import load_product
-from experiments.campaigns.campaign import run_campaign
-from experiments.campaigns.points import grid, trials
+from experiments.campaigns.store import write_index, write_trial
+from experiments.campaigns.trial import Row
 from experiments.cli.main import main
 from experiments.compare.comparison import Mean, compared
 from experiments.compare.tolerances import BY_UNIT, EXACT, NAMED, tolerance_of
@@ -232,25 +231,44 @@ def test_one_trial_that_flips_is_no_chance(tmp_path: Path) -> None:
     assert outcome(tmp_path, once, never)[0] == 1
 
 
+def campaign(out: Path, speeds: list[float], load: float, key: str) -> Path:
+    """Write the folder of a campaign: two seeds at each speed. Keys differ as those of code do."""
+    rows = [
+        Row(f"{key}{k}{seed}", "push", "motor_unit", seed, {"push.speed": speed}, {}, {}, "success",
+            measured={"load_N": load + seed, "odd": None})
+        for k, speed in enumerate(speeds)
+        for seed in range(2)
+    ]  # fmt: skip
+    for each in rows:
+        write_trial(out, each)
+    write_index(out, rows)
+    return out
+
+
 def test_campaigns_are_compared_trial_by_trial(tmp_path: Path) -> None:
     """Matched by what varies in them and by seed."""
-
-    def campaign(name: str, hardness: float, speeds: list[float]) -> Path:
-        points = grid({"push.speed": speeds, "hardness": [hardness]})
-        wanted = trials(experiments.tiny, points, seeds=range(2))
-        out = tmp_path / name
-        run_campaign(wanted, out)
-        return out
-
-    same, again = campaign("a", 1.0, [0.1, 0.2]), campaign("b", 1.0, [0.1, 0.2])
-    assert compare(same, again) == 0
-    fewer = campaign("c", 1.0, [0.1])
-    assert compare(same, fewer) == 1
+    a = campaign(tmp_path / "a", [0.1, 0.2], 10.0, "x")
+    assert compare(a, campaign(tmp_path / "b", [0.1, 0.2], 10.5, "y")) == 0
+    assert compare(a, campaign(tmp_path / "c", [0.1], 10.0, "x")) == 1
     rows = json.loads((tmp_path / "out" / "compare.json").read_text())["differences"]
-    assert [row["where"] for row in rows] == [
-        f"push.speed=0.2, hardness=1.0, seed={seed}" for seed in range(2)
-    ]
-    assert compare(same, campaign("d", 2.0, [0.1])) == 2  # Nothing in common.
+    assert [row["where"] for row in rows] == ["push.speed=0.2, seed=0", "push.speed=0.2, seed=1"]
+    assert compare(a, campaign(tmp_path / "d", [0.1, 0.2], 14.0, "x")) == 1
+    rows = json.loads((tmp_path / "out" / "compare.json").read_text())["differences"]
+    assert [row["quantity"] for row in rows] == ["load_N"] * 4
+    assert compare(a, campaign(tmp_path / "e", [0.3], 10.0, "x")) == 2  # Nothing in common.
+
+
+def test_damaged_trial_and_index_are_named(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    a = campaign(tmp_path / "a", [0.1], 10.0, "x")
+    (a / "trials" / "x00.json").write_text("{}")
+    assert compare(a, a) == 2
+    assert "x00.json' is damaged" in capsys.readouterr().err
+    (a / "trials" / "x00.json").unlink()
+    assert compare(a, a) == 2
+    assert "x00.json" in capsys.readouterr().err
+    (a / "trials.parquet").write_text("no index")
+    assert compare(a, a) == 2
+    assert "it is no index of a campaign" in capsys.readouterr().err
 
 
 # ---- Plans
