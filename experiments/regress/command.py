@@ -113,6 +113,7 @@ class Regression:
             "command": "regress",
             "baseline": self.path,
             "cases": list(self.suite.cases),
+            "metrics": [],
             "seed": SEED,
             "config": finite(self.config.to_dict()),
             "versions": versions(),
