@@ -19,7 +19,7 @@ import campaign_experiments as experiments
 import pyarrow.parquet as parquet
 import pytest
 
-from cell.errors import CellError, InputError
+from cell.errors import CellError, InputError, MachineError
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.executors import LocalExecutor, WorkerDied
 from experiments.campaigns.points import grid, trials
@@ -115,6 +115,17 @@ def test_killed_worker_costs_only_its_trial(tmp_path: Path) -> None:
     assert read_trial(trial_file(tmp_path, wanted[1].key)).verdict == "killed"
     again = run_campaign(wanted, tmp_path)
     assert [row.verdict for row in again] == ["success"] * 4
+
+
+def test_what_the_machine_refuses_ends_the_campaign_and_is_no_verdict(tmp_path: Path) -> None:
+    full = tmp_path / "full"
+    full.touch()
+    wanted = trials(experiments.on_a_full_disk, [{"full": str(full)}], seeds=range(9))
+    with pytest.raises(MachineError, match="No space left"):
+        run_campaign(wanted, tmp_path)
+    assert [file.stem for file in tmp_path.glob("trials/*.json")] == [wanted[0].key]
+    full.unlink()
+    assert [row.verdict for row in run_campaign(wanted, tmp_path)] == ["success"] * 9
 
 
 def test_finished_trials_are_not_run_again(tmp_path: Path) -> None:
