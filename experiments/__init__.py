@@ -6,11 +6,13 @@ returns an `Outcome`, `trials` of it over a `grid`, a `sample` and seeds, and `r
 The folders are what the scripts share, from the lowest up:
 
 - `reporting`: files, pages, plots, pictures.
-- `jig`: element tests of the soft jig alone.
 - `plan`, `assembly`: ``soft-jig plan`` and ``soft-jig assemble``.
 - `campaigns`: many trials of an experiment, ``soft-jig sweep``.
 - `speed`: what a simulated second costs.
-- `paper`: its experiments, ``soft-jig place``, ``push`` and ``regress``.
+- `jig`: element tests of the soft jig alone, and what it holds.
+- `paper`: its experiments, ``soft-jig place`` and ``push``.
+- `compare`: what differs between two results beyond its tolerance, ``soft-jig compare``.
+- `regress`: experiments against stored metrics, ``soft-jig regress``.
 - `cli`: the command line.
 
 A test keeps their imports pointing down.

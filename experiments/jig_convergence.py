@@ -22,23 +22,20 @@ from typing import Any
 import numpy as np
 import tyro
 
-from cell import CellConfig, load_product
+from cell import CellConfig
 from cell.errors import RunFailure
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
-from experiments.campaigns.trial import Outcome, Row, Task
+from experiments.campaigns.trial import Row
 from experiments.cli.ending import exit_code
-from experiments.jig.element_rig import ElementRig
-from experiments.jig.element_tests import PUSH_HEIGHT, SIDEWAYS
-from experiments.jig.specimens import Prism, ProductPart, Specimen
+from experiments.jig.holding import SPECIMENS, SPEED
 
-DEPTH = 0.010
 # Coarse to fine [m], [s]; the defaults are among them.
 MESH_SIZES = (10e-3, 5e-3, 2.5e-3)
 CELLS = (2e-3, 1.5e-3, 1e-3, 0.75e-3)
 STEPS = (2e-3, 1e-3, 0.5e-3)
 APPROXIMATIONS = ("lagged", "similar", "sap")
-SPEED, SLOW = 0.020, 0.005  # Of the drag [m/s].
+SLOW = 0.005  # Of the drag [m/s].
 
 
 @dataclass(frozen=True)
@@ -73,55 +70,6 @@ def variations() -> Iterator[Variation]:
         yield Variation("dragged slowly", name, changes, speed=SLOW)
 
 
-def specimens() -> dict[str, Specimen]:
-    """Return the specimens by name."""
-    plate = load_product("motor_unit").parts["plate"]
-    return {
-        "standing": Prism(),
-        "lying": Prism(lying=True),
-        "plate P2": ProductPart(plate, (0, 1, 0)),
-    }
-
-
-def hold(
-    task: Task, *, specimen: str = "standing", speed: float = SPEED, depth: float = DEPTH
-) -> Outcome:
-    """Measure the resistance to a push near the top of a part, across its least stable side.
-
-    Args:
-        task: With the settings of a variation.
-        specimen: Name of the part.
-        speed: Of the drag [m/s].
-        depth: To which the part is pressed in [m].
-    """
-    part, steps = specimens()[specimen], task.config.simulation
-    rig = ElementRig(
-        task.config.jig,
-        part,
-        time_step=steps.time_step,
-        approximation=steps.contact_approximation,
-    )
-    rig.lower_to(depth, speed=0.04)
-    rig.jam()
-    rig.let_go(0.2)
-    top = rig.X_JP.inverse() @ np.array([0.0, 0.0, rig.params.bag.cap_height + lever(part)])
-    # A cylinder lying along x is pushed across its axis, the plate out of its plane.
-    direction = SIDEWAYS if isinstance(part, Prism) and not part.lying else across(rig)
-    return Outcome(True, {"holding_N": rig.drag(top, direction, speed=speed).holding_force})
-
-
-def lever(specimen: Specimen) -> float:
-    """Return the height of the push over the apex [m]: `PUSH_HEIGHT` if the part is that tall."""
-    height = np.ptp(specimen.mesh().vertices @ specimen.X_CP.rotation().matrix()[2])
-    return float(min(PUSH_HEIGHT, height - DEPTH - 0.005))
-
-
-def across(rig: ElementRig) -> np.ndarray:
-    """Return the horizontal axis (3,) of J along which the part is thinnest."""
-    corners = rig.part.mesh().vertices @ rig.X_JP.rotation().matrix().T
-    return np.eye(3)[int(np.argmin(np.ptp(corners, axis=0)[:2]))]
-
-
 def last_refinement(rows: Sequence[Sequence[Any]]) -> dict[str, list[float]]:
     """Return the relative change of each force over the last refinement of each quantity.
 
@@ -151,17 +99,18 @@ def run(out: Path, workers: int) -> int:
         RunFailure: A trial came to no verdict.
     """
     out.mkdir(parents=True, exist_ok=True)
-    names = list(specimens())
     found = list(variations())
     points = [
-        {"specimen": name, "speed": each.speed, **each.changes} for each in found for name in names
+        {"specimen": name, "speed": each.speed, **each.changes}
+        for each in found
+        for name in SPECIMENS
     ]
-    wanted = [trials(hold, [point], config=vented()) for point in points]
+    wanted = [trials("hold", [point], config=vented()) for point in points]
     planned = {trial.key: trial for (trial,) in wanted}
     ended = {row.key: row for row in run_campaign(list(planned.values()), out, workers=workers)}
     forces = [force_of(ended[trial.key]) for (trial,) in wanted]
     rows: list[list[str | float]] = [
-        [each.varied, each.value, *forces[k * len(names) : (k + 1) * len(names)]]
+        [each.varied, each.value, *forces[k * len(SPECIMENS) : (k + 1) * len(SPECIMENS)]]
         for k, each in enumerate(found)
     ]
     for varied, value, *values in rows:
@@ -170,7 +119,7 @@ def run(out: Path, workers: int) -> int:
         print(f"{varied:14s} {'last':8s}" + "".join(f"{change:+9.1%}  " for change in changes))
     with (out / "convergence.csv").open("w", newline="", encoding="utf-8") as file:
         writer = csv.writer(file)
-        writer.writerow(["varied", "value", *(f"{name} [N]" for name in names)])
+        writer.writerow(["varied", "value", *(f"{name} [N]" for name in SPECIMENS)])
         writer.writerows(rows)
     return 0
 

@@ -5,7 +5,7 @@ import signal
 import time
 from pathlib import Path
 
-from cell.errors import RunFailure
+from cell.errors import MachineError, RunFailure
 from experiments.campaigns.trial import Outcome, Task
 
 
@@ -36,6 +36,13 @@ def faulty(task: Task) -> Outcome:
     if task.seed == 1:
         raise ValueError("a bug [of ours]")
     return Outcome(False, phase="grip", evidence="lost")
+
+
+def on_a_full_disk(task: Task, *, full: str = "") -> Outcome:
+    """Be refused by the machine, from seed 1 on, as long as a file exists."""
+    if task.seed > 0 and Path(full).exists():
+        raise MachineError("Cannot write 'log.npz': No space left on device.")
+    return Outcome(True)
 
 
 def counting(task: Task, *, folder: str = "") -> Outcome:

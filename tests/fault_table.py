@@ -41,7 +41,7 @@ def working(command: str, out: Path) -> Process:
     """Return a command that has been at work for a while."""
     process = started(command, out)
     process.wait_for((out / ".lock").exists)
-    if command not in ("plan", "regress"):
+    if command != "plan":
         process.wait_for(lambda: result_in(out).get("verdict") == "running")
     time.sleep(WORKS)
     return process

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import shutil
 import signal
 import subprocess
 import sys
 import threading
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -18,7 +19,7 @@ import campaign_experiments as experiments
 import pyarrow.parquet as parquet
 import pytest
 
-from cell.errors import CellError, InputError
+from cell.errors import CellError, InputError, MachineError
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.executors import LocalExecutor, WorkerDied
 from experiments.campaigns.points import grid, trials
@@ -47,38 +48,52 @@ def wait_for(condition: Callable[[], bool], seconds: float = 60.0) -> None:
         time.sleep(0.05)
 
 
-def test_every_trial_is_a_row_in_files_index_and_summary(tmp_path: Path) -> None:
-    wanted = tiny_trials(hardness=4.0)
-    rows = run_campaign(wanted, tmp_path, workers=2)
+@dataclass(frozen=True)
+class Campaign:
+    """A campaign that has been run, for tests that read its folder or copy it."""
+
+    wanted: list[Trial]
+    out: Path
+    rows: list[Row]
+
+
+@pytest.fixture(scope="module")
+def campaign(tmp_path_factory: pytest.TempPathFactory) -> Campaign:
+    wanted, out = tiny_trials(hardness=4.0), tmp_path_factory.mktemp("campaign")
+    return Campaign(wanted, out, run_campaign(wanted, out, workers=2))
+
+
+def test_every_trial_is_a_row_in_files_index_and_summary(campaign: Campaign) -> None:
+    wanted, rows, out = campaign.wanted, campaign.rows, campaign.out
     assert [row.key for row in rows] == [trial.key for trial in wanted]
     assert comparable(rows) == comparable(
-        [read_trial(trial_file(tmp_path, trial.key)) for trial in wanted]
+        [read_trial(trial_file(out, trial.key)) for trial in wanted]
     )
     verdicts = ["success"] * 4 + ["failure"] * 2  # 0.3 m/s x 4 is too much.
     assert [row.verdict for row in rows] == verdicts
-    frame = parquet.read_table(tmp_path / "trials.parquet").to_pandas()
+    frame = parquet.read_table(out / "trials.parquet").to_pandas()
     assert list(frame["verdict"]) == verdicts
     assert list(frame["push.speed"]) == [0.1, 0.1, 0.2, 0.2, 0.3, 0.3]
     assert frame["load_N"][5] == pytest.approx(1.201)
     assert frame["odd"].isna().tolist() == [False, True] * 3
-    summary = json.loads((tmp_path / "summary.json").read_text())
+    summary = json.loads((out / "summary.json").read_text())
     assert (summary["verdict"], summary["success"], summary["failure"]) == ("failure", 4, 2)
     # Wilson's interval of 4 of 6.
     assert summary["success_interval"] == pytest.approx([0.300, 0.903], abs=1e-3)
     (phase,) = summary["failures_by_phase"]
     assert (phase["phase"], phase["trials"], len(phase["states"])) == ("press", 2, 2)
-    assert (tmp_path / phase["states"][0]).read_bytes() == b"state"
-    assert "failed_state.npz" in (tmp_path / "report.html").read_text()
+    assert (out / phase["states"][0]).read_bytes() == b"state"
+    assert "failed_state.npz" in (out / "report.html").read_text()
 
 
-def test_index_is_read_by_duckdb(tmp_path: Path) -> None:
+def test_index_is_read_by_duckdb(campaign: Campaign) -> None:
     duckdb = pytest.importorskip("duckdb")
-    run_campaign(tiny_trials(), tmp_path)
     found = duckdb.sql(
-        f"select \"push.speed\", count(*), max(load_N) from '{tmp_path}/trials.parquet' "
+        f"select \"push.speed\", count(*), max(load_N) from '{campaign.out}/trials.parquet' "
         'group by all order by "push.speed"'
     ).fetchall()
-    assert found == [(0.1, 2, 0.101), (0.2, 2, 0.201), (0.3, 2, 0.301)]
+    assert [row[:2] for row in found] == [(0.1, 2), (0.2, 2), (0.3, 2)]
+    assert [row[2] for row in found] == pytest.approx([0.401, 0.801, 1.201])
 
 
 def test_errors_are_rows_and_are_told_from_failures(tmp_path: Path) -> None:
@@ -93,13 +108,24 @@ def test_errors_are_rows_and_are_told_from_failures(tmp_path: Path) -> None:
 def test_killed_worker_costs_only_its_trial(tmp_path: Path) -> None:
     """It is a row, too, and the same command runs it again."""
     once = str(tmp_path / "killed_once")
-    wanted = trials(experiments.deadly, [{"once": once}], seeds=range(6))
+    wanted = trials(experiments.deadly, [{"once": once}], seeds=range(4))
     rows = run_campaign(wanted, tmp_path)
-    assert [row.verdict for row in rows] == ["success", "killed"] + ["success"] * 4
+    assert [row.verdict for row in rows] == ["success", "killed"] + ["success"] * 2
     assert rows[1].evidence == "its process was ended by SIGKILL"
     assert read_trial(trial_file(tmp_path, wanted[1].key)).verdict == "killed"
     again = run_campaign(wanted, tmp_path)
-    assert [row.verdict for row in again] == ["success"] * 6
+    assert [row.verdict for row in again] == ["success"] * 4
+
+
+def test_what_the_machine_refuses_ends_the_campaign_and_is_no_verdict(tmp_path: Path) -> None:
+    full = tmp_path / "full"
+    full.touch()
+    wanted = trials(experiments.on_a_full_disk, [{"full": str(full)}], seeds=range(9))
+    with pytest.raises(MachineError, match="No space left"):
+        run_campaign(wanted, tmp_path)
+    assert [file.stem for file in tmp_path.glob("trials/*.json")] == [wanted[0].key]
+    full.unlink()
+    assert [row.verdict for row in run_campaign(wanted, tmp_path)] == ["success"] * 9
 
 
 def test_finished_trials_are_not_run_again(tmp_path: Path) -> None:
@@ -114,30 +140,27 @@ def test_finished_trials_are_not_run_again(tmp_path: Path) -> None:
     }
 
 
-@pytest.mark.parametrize("damage", ["cut off", "changed", "swapped", "empty"])
-def test_damaged_trial_is_noticed_and_run_again(damage: str, tmp_path: Path) -> None:
-    wanted = tiny_trials()
-    rows = run_campaign(wanted, tmp_path)
-    file = trial_file(tmp_path, wanted[2].key)
-    text = file.read_text()
-    if damage == "swapped":
-        text = trial_file(tmp_path, wanted[3].key).read_text()
-    file.write_text(
-        {
-            "cut off": text[: len(text) // 2],
-            "changed": text.replace("success", "failure"),
-            "swapped": text,
-            "empty": "",
-        }[damage]
-    )
-    with pytest.raises(DamagedTrial, match=wanted[2].key):
-        read_trial(file)
-    assert comparable(run_campaign(wanted, tmp_path)) == comparable(rows)
-    assert read_trial(file).verdict == "success"
+def test_damaged_trials_are_noticed_and_run_again(campaign: Campaign, tmp_path: Path) -> None:
+    """A file that was cut off, changed, swapped with another or emptied."""
+    wanted, rows, out = campaign.wanted, campaign.rows, tmp_path / "copy"
+    shutil.copytree(campaign.out, out)
+    files = [trial_file(out, trial.key) for trial in wanted]
+    texts = [file.read_text() for file in files]
+    files[0].write_text(texts[0][: len(texts[0]) // 2])
+    files[1].write_text(texts[1].replace("success", "failure"))
+    files[2].write_text(texts[5])
+    files[3].write_text("")
+    for file in files[:4]:
+        with pytest.raises(DamagedTrial, match=file.stem):
+            read_trial(file)
+    times = [file.stat().st_mtime_ns for file in files[4:]]
+    assert comparable(run_campaign(wanted, out)) == comparable(rows)
+    assert [file.stat().st_mtime_ns for file in files[4:]] == times
+    assert comparable([read_trial(file) for file in files]) == comparable(rows)
 
 
 def test_two_writers_leave_whole_files_with_the_same_rows(tmp_path: Path) -> None:
-    wanted, found = tiny_trials(seeds=4), {}
+    wanted, found = tiny_trials(seeds=3), {}  # Nine: no process is replaced.
 
     def write(number: int) -> None:
         found[number] = run_campaign(wanted, tmp_path)
@@ -166,6 +189,24 @@ def test_measured_quantity_with_the_name_of_a_column_is_refused(tmp_path: Path) 
 # ---- Stopped and gone on with
 
 
+def test_stopped_campaign_goes_on_to_the_same_rows(campaign: Campaign, tmp_path: Path) -> None:
+    """What ended before the stop is kept; the rest is run by the next call."""
+
+    def stop(row: Row) -> None:
+        raise KeyboardInterrupt
+
+    with pytest.raises(KeyboardInterrupt):
+        run_campaign(campaign.wanted, tmp_path, ended=stop)
+    kept = {file: file.stat().st_mtime_ns for file in tmp_path.glob("trials/*.json")}
+    assert 1 <= len(kept) < len(campaign.wanted)
+    assert json.loads((tmp_path / "summary.json").read_text())["verdict"] == "interrupted"
+    assert parquet.read_table(tmp_path / "trials.parquet").num_rows == len(kept)
+    rows = run_campaign(campaign.wanted, tmp_path)
+    assert comparable(rows) == comparable(campaign.rows)
+    assert all(file.stat().st_mtime_ns == time for file, time in kept.items())
+
+
+@pytest.mark.slow
 def test_interrupted_campaign_keeps_what_was_done_and_goes_on(tmp_path: Path) -> None:
     """After SIGINT nothing runs on; the same command ends with the rows of an undisturbed run."""
     command = [
@@ -195,6 +236,7 @@ def test_interrupted_campaign_keeps_what_was_done_and_goes_on(tmp_path: Path) ->
     assert index_of(out) == index_of(tmp_path / "whole")
 
 
+@pytest.mark.slow
 def test_workers_end_when_the_campaign_is_killed(tmp_path: Path) -> None:
     """By SIGKILL: nobody is left to tell them."""
     command = [sys.executable, "-m", "experiments", "sweep", f"{SCRIPT}:tiny"]
@@ -240,6 +282,40 @@ def test_exception_of_a_task_is_raised_and_its_process_goes_on() -> None:
         assert executor.submit(os.getpid).result() != first
 
 
+def test_processes_end_with_the_one_that_started_them(tmp_path: Path) -> None:
+    """Also after SIGKILL, in the middle of a task."""
+    script = (
+        "import os, time\n"
+        "from experiments.campaigns.executors import LocalExecutor\n"
+        "if __name__ == '__main__':\n"
+        "    executor = LocalExecutor(1)\n"
+        "    print(executor.submit(os.getpid).result(), flush=True)\n"
+        "    executor.submit(time.sleep, 60.0).result()\n"
+    )
+    (tmp_path / "parent.py").write_text(script)
+    parent = subprocess.Popen(
+        [sys.executable, str(tmp_path / "parent.py")],
+        env={**os.environ, "PYTHONPATH": str(ROOT)},
+        stdout=subprocess.PIPE,
+        text=True,
+    )
+    assert parent.stdout is not None
+    worker = int(parent.stdout.readline())
+    assert is_running(worker)
+    parent.kill()
+    parent.communicate()
+    wait_for(lambda: not is_running(worker))
+
+
+def is_running(process: int) -> bool:
+    """Return whether a process runs; one that only waits to be taken note of does not."""
+    try:
+        return Path(f"/proc/{process}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except FileNotFoundError:
+        return False
+
+
+@pytest.mark.slow
 def test_dask_cluster_gives_the_same_rows(tmp_path: Path) -> None:
     """Two worker processes, with a trial that kills its worker."""
     distributed = pytest.importorskip("distributed")

@@ -7,15 +7,9 @@ from pathlib import Path
 import pytest
 
 from experiments.campaigns.trial import Task
+from experiments.jig.holding import SPECIMENS, hold, lever, specimen_named
 from experiments.jig.specimens import Prism
-from experiments.jig_convergence import (
-    hold,
-    last_refinement,
-    lever,
-    specimens,
-    variations,
-    vented,
-)
+from experiments.jig_convergence import last_refinement, variations, vented
 
 
 def test_every_variation_changes_one_quantity() -> None:
@@ -38,7 +32,7 @@ def test_last_refinement_is_the_relative_change_at_the_fine_end() -> None:
 
 
 def test_every_specimen_is_pushed_below_its_top() -> None:
-    levers = {name: lever(part) for name, part in specimens().items()}
+    levers = {name: lever(specimen_named(name)) for name in SPECIMENS}
     assert levers["standing"] == pytest.approx(0.039, abs=1e-3)
     assert levers["lying"] == pytest.approx(0.020, abs=1e-3)
 

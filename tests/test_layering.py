@@ -52,15 +52,19 @@ LAYERS: dict[str, dict[str, set[str]]] = {
     },
     "experiments": {
         "reporting": set(),
-        "jig": set(),
         "plan": {"reporting"},
         "assembly": {"reporting"},
         "campaigns": {"reporting", "assembly"},
         "product": {"reporting", "assembly"},
         "speed": {"reporting", "assembly"},
         "vision": set(),
+        "jig": {"campaigns"},
         "paper": {"reporting", "campaigns", "speed"},
-        "cli": {"reporting", "plan", "assembly", "campaigns", "paper", "product"},
+        "compare": {"reporting", "campaigns"},
+        "regress": {"reporting", "campaigns", "speed", "jig", "paper", "compare"},
+        "cli": {
+            "reporting", "plan", "assembly", "campaigns", "product", "paper", "compare", "regress",
+        },
     },
 }  # fmt: skip
 EVERYWHERE = {

@@ -28,7 +28,8 @@ from cell.simulation.phase import (
 )
 from experiments import speed_benchmark
 from experiments.assembly.prepare import RunningCell
-from experiments.paper import regress
+from experiments.campaigns.trial import Row
+from experiments.regress import command
 from experiments.speed.calibration import Kernel
 from experiments.speed.layers import LAYERS, TimedMonitor, beginning, measure_phase, probe
 from experiments.speed.meter import Meter, changes, ratios, slower
@@ -136,12 +137,15 @@ def test_kernel_does_the_same_work_each_time() -> None:
 def test_regress_warns_of_a_slower_class_and_does_not_fail(
     now: float, warned: bool, tmp_path: Path, monkeypatch: Any, capsys: pytest.CaptureFixture
 ) -> None:
-    monkeypatch.setattr(regress, "BASELINE", tmp_path)
     speeds = iter([{"contact": 100.0}, {"contact": now}])
-    monkeypatch.setattr(regress, "run_suite", lambda *_: ({}, next(speeds)))
+    monkeypatch.setattr(command, "ratios", lambda _: next(speeds))
+    row = Row("k", "hold", "motor_unit", 0, {}, {}, {}, "success", measured={"holding_N": 4.0})
+    monkeypatch.setattr(command.Regression, "_run_trials", lambda *_: {"hold/standing": [row]})
+    own = tmp_path / "own.json"
     for update in (True, False):
-        assert regress.run_regress("quick", update, CellConfig(), tmp_path, 1, quiet=False) == 0
-    assert json.loads((tmp_path / "quick.json").read_text())["speed"] == {"contact": 100.0}
+        wanted = command.Regression.of("quick", ["hold/standing"], own, update, config=CellConfig())
+        assert wanted.run(tmp_path) == 0
+    assert json.loads(own.read_text())["speed"] == {"contact": 100.0}
     assert ("Warning: 'contact' takes 30% more" in capsys.readouterr().out) is warned
     result = json.loads((tmp_path / "result.json").read_text())
     assert result["verdict"] == "success"

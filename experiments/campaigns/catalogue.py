@@ -23,6 +23,7 @@ BUILT_IN = {
     "assemble": "experiments.campaigns.assembly:assemble",
     "place": "experiments.paper.trial_tasks:place",
     "push": "experiments.paper.trial_tasks:push",
+    "hold": "experiments.jig.holding:hold",
 }
 
 

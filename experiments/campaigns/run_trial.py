@@ -8,7 +8,7 @@ import time
 import traceback
 from pathlib import Path
 
-from cell.errors import CellError, RunFailure
+from cell.errors import CellError, MachineError, RunFailure
 from experiments.campaigns.catalogue import experiment_named
 from experiments.campaigns.code_version import code_digest
 from experiments.campaigns.points import settings_of
@@ -23,8 +23,11 @@ EVIDENCE_LENGTH = 400
 def run_trial(trial: Trial, out: Path) -> Row:
     """Run a trial, write its file and return its row.
 
-    A failure is a verdict, and so is an exception of the experiment; only what keeps the file from
-    being written is raised.
+    A failure is a verdict, and so is an exception of the experiment. What the machine refused is
+    raised: a disk that is full says nothing about the trial, and the next one would fare no better.
+
+    Raises:
+        MachineError: A file of the trial cannot be written.
     """
     folder = trial_folder(out, trial.key)
     shutil.rmtree(folder, ignore_errors=True)  # Of an attempt that was killed.
@@ -40,6 +43,8 @@ def run_trial(trial: Trial, out: Path) -> Row:
         verdict = "success" if outcome.success else "failure"
     except RunFailure as error:
         outcome, verdict = Outcome(False, phase=UNKNOWN_PHASE, evidence=str(error)), "failure"
+    except MachineError:
+        raise
     except Exception as error:
         text = traceback.format_exc()
         evidence = f"{type(error).__name__}: {error}"

@@ -20,10 +20,12 @@ from cell.errors import UnknownName
 from experiments.cli.assemble import Assemble
 from experiments.cli.check import Check
 from experiments.cli.common import BadUsage
+from experiments.cli.compare import Compare
 from experiments.cli.ending import exit_code
 from experiments.cli.init import Init
-from experiments.cli.paper import Place, Push, Regress
+from experiments.cli.paper import Place, Push
 from experiments.cli.plan import Plan
+from experiments.cli.regress import Regress
 from experiments.cli.sweep import Sweep
 
 DESCRIPTION = """\
@@ -32,7 +34,7 @@ Exit code 0: success. 1: it ran and failed. 2: bad input, named in one line on s
 3: an error of the machine or of ours. 130, 143: interrupted; what was done is kept.
 --version prints the versions of the twin and of Drake.
 """
-Command = Plan | Assemble | Init | Check | Place | Push | Regress | Sweep
+Command = Plan | Assemble | Init | Check | Place | Push | Regress | Sweep | Compare
 COMMANDS: dict[str, type[Command]] = {
     "plan": Plan,
     "assemble": Assemble,
@@ -42,6 +44,7 @@ COMMANDS: dict[str, type[Command]] = {
     "push": Push,
     "regress": Regress,
     "sweep": Sweep,
+    "compare": Compare,
 }
 
 

@@ -1,4 +1,4 @@
-"""``soft-jig place``, ``soft-jig push``, ``soft-jig regress``, and their options."""
+"""``soft-jig place``, ``soft-jig push``, and their options."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import Common
 from experiments.reporting.output import output_folder
 
 
@@ -67,37 +67,6 @@ class Push:
     def run(self) -> int:
         """Write ``result.json`` and ``report.html``; return the exit code."""
         return _run_experiment("push", self)
-
-
-@dataclass(frozen=True)
-class Regress:
-    """Run experiments with seed 0 and compare outcomes and metrics with the stored ones."""
-
-    suite: Literal["quick", "full"] = "quick"
-    """quick: four cases, minutes; full: every case three times."""
-
-    update: bool = False
-    """Store what comes out, and print what changes."""
-
-    workers: Annotated[int, arg(metavar="N")] = 1
-    """Trials at a time. What is done already is not run again."""
-
-    common: OmitArgPrefixes[Common] = field(default_factory=Common)
-
-    def run(self) -> int:
-        """Write ``result.json``; return the exit code."""
-        config = self.common.load_config()
-        if self.common.seed != 0:
-            raise BadUsage("The stored metrics are those of --seed 0: leave it out.")
-        from experiments.paper.place_push import check_numbers
-
-        check_numbers(workers=self.workers)
-        with output_folder(self.common.out) as out:
-            from experiments.paper.regress import run_regress
-
-            return run_regress(
-                self.suite, self.update, config, out, self.workers, self.common.quiet
-            )
 
 
 def _run_experiment(command: str, options: Place | Push) -> int:

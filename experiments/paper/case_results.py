@@ -16,7 +16,6 @@ from scipy.stats import ttest_ind
 from cell.configuration.config import CellConfig
 from experiments.paper.case_plots import PAPER_MEANS, plot_forces, plot_quantity, plot_rates
 from experiments.paper.cases import CaseResult
-from experiments.reporting.output import write_json
 from experiments.reporting.provenance import finite, versions
 from experiments.reporting.report import Picture, write_report
 
@@ -81,10 +80,10 @@ def verdict(results: Sequence[CaseResult]) -> str:
     return "success" if all(result.agrees for result in results) else "failure"
 
 
-def write_case_results(
+def write_case_report(
     experiment: Experiment, results: Sequence[CaseResult], pictures: Sequence[Picture], notes
 ) -> None:
-    """Write ``result.json`` and ``report.html`` into the folder of the experiment."""
+    """Write ``report.html`` into the folder of the experiment."""
     result = summary(experiment, results)
     push = experiment.command == "push"
     failures = [
@@ -103,21 +102,28 @@ def write_case_results(
         plots=_plots(results, push),
         notes=remarks,
     )
-    # Last: where it exists, the rest exists, too.
-    write_json(experiment.out / "result.json", result)
 
 
 def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, Any]:
     """Return the content of ``result.json``."""
-    trials = [trial.trial for result in results for trial in result.trials]
-    simulated = sum(trial.sim_seconds for trial in trials)
-    spent = sum(trial.cpu_seconds for trial in trials)
     return {
         "command": experiment.command,
         "product": "motor_unit",
         "order": [],
         "seed": experiment.seed,
         "hand": experiment.hand,
+        **case_results(results),
+        "config": finite(experiment.config.to_dict()),
+        "versions": versions(),
+    }
+
+
+def case_results(results: Sequence[CaseResult]) -> dict[str, Any]:
+    """Return what ``result.json`` says of the trials that have ended."""
+    trials = [trial.trial for result in results for trial in result.trials]
+    simulated = sum(trial.sim_seconds for trial in trials)
+    spent = sum(trial.cpu_seconds for trial in trials)
+    return {
         "verdict": verdict(results),
         "cases": [_case(result) for result in results],
         "by_outcome": {
@@ -126,8 +132,6 @@ def summary(experiment: Experiment, results: Sequence[CaseResult]) -> dict[str, 
         },
         "real_time_factor": simulated / max(spent, 1e-9),
         "cpu_seconds_per_trial": spent / max(len(trials), 1),
-        "config": finite(experiment.config.to_dict()),
-        "versions": versions(),
     }
 
 

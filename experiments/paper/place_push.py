@@ -19,16 +19,17 @@ from experiments.campaigns.store import trial_folder
 from experiments.campaigns.trial import Row
 from experiments.paper.case_results import (
     Experiment,
+    case_results,
     case_table,
     summary,
     verdict,
-    write_case_results,
+    write_case_report,
 )
 from experiments.paper.cases import Case, CaseResult, TrialResult, cases_of
 from experiments.paper.trial import TrialRecord, check_fits
 from experiments.paper.trial_tasks import CRITERION, LOG, PICTURES, from_arrays
 from experiments.reporting.html_page import Picture
-from experiments.reporting.output import write_json
+from experiments.reporting.result_file import ResultFile
 from experiments.speed.meter import Meter
 
 PRODUCT = "motor_unit"
@@ -63,31 +64,35 @@ def run_experiment(experiment: Experiment, label: str | None) -> int:
 
     def ended(row: Row) -> None:
         done.append(row)
-        running = summary(experiment, results_of(cases, done, experiment.out))
-        write_json(experiment.out / "result.json", running | {"verdict": "running"})
+        course = case_results(results_of(cases, done, experiment.out))
+        result.update(**course | {"verdict": "running"})
 
     points = [
         {"case": case.label, "hand": experiment.hand, "number": number}
         for case in cases
         for number in range(experiment.trials)
     ]
-    rows = run_campaign(
-        trials(
-            experiment.command,
-            points,
-            product=PRODUCT,
-            config=experiment.config,
-            seeds=[experiment.seed],
-        ),
-        experiment.out,
-        workers=experiment.workers,
-        about={"command": experiment.command},
-        console=console,
-        ended=ended,
-        report=False,
+    wanted = trials(
+        experiment.command,
+        points,
+        product=PRODUCT,
+        config=experiment.config,
+        seeds=[experiment.seed],
     )
-    found = results_of(cases, rows, experiment.out)
-    write_case_results(experiment, found, *_pictures(experiment, rows))
+    with ResultFile(experiment.out, summary(experiment, [])) as result:
+        rows = run_campaign(
+            wanted,
+            experiment.out,
+            workers=experiment.workers,
+            about={"command": experiment.command},
+            console=console,
+            ended=ended,
+            report=False,
+        )
+        found = results_of(cases, rows, experiment.out)
+        write_case_report(experiment, found, *_pictures(experiment, rows))
+        # Last: whoever finds a verdict finds the report, too.
+        result.update(**case_results(found))
     console.print(case_table(experiment.command, found))
     if not all(row.done for row in rows):
         return 3

@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform
 from cell.errors import UnknownName
 from cell.machines.cameras.rendering import rendering_problem
 from cell.products.loading import load_product
+from cell.whole_file import whole_file
 from experiments.campaigns.trial import Outcome, Task
 from experiments.paper.cases import case_named, case_seed, judged
 from experiments.paper.rig.stage import Observer
@@ -30,7 +31,7 @@ from experiments.speed.meter import Meter, Spent
 from planning.operations.phase_class import PhaseClass
 
 HANDS = ("rig", "robot")
-LOG = "log.npz"
+LOG, FAILED_STATE = "log.npz", "failed_state.npz"
 PICTURES = {"place": ("placed", "end"), "push": ("before", "after", "end")}
 CRITERION = "criterion"
 """The phase in which a trial failed that ran to its end."""
@@ -81,6 +82,8 @@ def _trial(command: str, task: Task, label: str, hand: str, number: int, timed: 
     after = kernel.time() if kernel else 0.0
     write_arrays(task.file(LOG), to_arrays(trial, (before + after) / 2))
     result = judged(case, trial)
+    if not result.success:
+        write_arrays(task.file(FAILED_STATE), trial.state)
     phase, evidence = trial.failure or ("", "")
     if not result.success and trial.failure is None:
         phase, evidence = CRITERION, "it ran to its end, but not as the criterion of success asks"
@@ -100,7 +103,8 @@ def _photographer(command: str, task: Task) -> Callable[[str, Observer], None]:
             return
         view = view_of(observer.stage.config.workcell.X_WJ)
         png = take_picture(observer.stage.scene_graph, observer.root, view)
-        task.file(f"{event}.png").write_bytes(png)
+        with whole_file(task.file(f"{event}.png")) as temporary:
+            temporary.write_bytes(png)
         taken.append(event)
 
     return take

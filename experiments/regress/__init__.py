@@ -1,0 +1,1 @@
+"""Outcomes and metrics of the experiments against stored ones: ``soft-jig regress``."""
