@@ -37,6 +37,14 @@ def package_above(file: Path) -> Path | None:
     return next((candidate for candidate in found if candidate.is_file()), None)
 
 
+def is_file(path: Path) -> bool:
+    """Return whether a path is a file; one that no file can have, too long or with NUL, is not."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
+
+
 def model_url(name: str) -> str:
     """Return the URL of ``models/sdf/<name>/<name>.sdf``; a URL is returned as it is.
 
