@@ -13,7 +13,7 @@ import numpy as np
 import trimesh
 
 from cell.errors import InputError
-from cell.products.surfaces import joined, merged
+from cell.products.surfaces import FARTHEST, joined, merged
 from cell.products.tree import Node, Surface
 
 TRIANGLES, TRIANGLE_STRIP = 4, 5
@@ -194,6 +194,8 @@ def _children(
     for index in indices:
         entry = header["nodes"][index]
         X_AP = X_AF @ _pose(entry)
+        if not np.abs(X_AP).max() <= FARTHEST:
+            raise ValueError("a pose that is no place")
         given, product, own = str(entry.get("name", "")), "", ()
         if "mesh" in entry:
             product = str(header["meshes"][entry["mesh"]].get("name", ""))
