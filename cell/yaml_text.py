@@ -21,7 +21,11 @@ MOST_VALUES = 100_000  # [A] Aliases written out in full.
 LONGEST_NUMBER = 40  # [A] Characters: twice what a double can tell apart.
 
 TAG = "tag:yaml.org,2002:"
-PLAIN = {TAG + kind for kind in ("null", "bool", "int", "float", "merge", "str", "seq", "map")}
+PLAIN: dict[str, set[str]] = {
+    "scalar": {TAG + kind for kind in ("null", "bool", "int", "float", "merge", "str")},
+    "sequence": {TAG + "seq"},
+    "mapping": {TAG + "map"},
+}
 
 
 class _Loader(yaml.SafeLoader):
@@ -39,7 +43,7 @@ for _kind, _pattern, _first in (  # Each with the characters that such a value m
     ("merge", r"<<", ["<"]),
 ):
     _Loader.add_implicit_resolver(TAG + _kind, re.compile(rf"(?:{_pattern})\Z"), _first)
-_Loader.add_constructor(TAG + "int", lambda loader, node: int(loader.construct_scalar(node)))
+_Loader.add_constructor(TAG + "int", lambda _, node: int(node.value))
 
 
 def read_yaml(file: Path) -> Any:
@@ -79,7 +83,7 @@ def parse_yaml(text: str | bytes, name: str) -> Any:
         return loader.construct_document(node)
     except RecursionError:
         raise InputError(f"{name} is nested deeper than {DEEPEST} levels.") from None
-    except (yaml.YAMLError, ValueError) as error:
+    except (yaml.YAMLError, ValueError, KeyError) as error:  # A KeyError for "!!bool x".
         raise InputError(f"{name} is not valid YAML: {_reason(error)}.") from error
     finally:
         if loader is not None:
@@ -115,7 +119,7 @@ class _Bounds:
             return known
         if id(node) in self._around:
             raise self._error(node, "an alias that contains itself")
-        if node.tag not in PLAIN:
+        if node.tag not in PLAIN[node.id]:
             raise self._error(node, f"a value tagged '{node.tag}': only plain values are read")
         self._around.add(id(node))
         inner = [self.check(child) for child in self._children(node)]

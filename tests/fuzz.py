@@ -36,7 +36,8 @@ TRACEBACK = 99  # Exit code of a child whose exception reached us.
 def run(case: Case) -> tuple[int, str, str]:
     """Return exit code (negative: the signal), what stands on stderr, and what is wrong."""
     with tempfile.TemporaryDirectory() as name:
-        folder = Path(name)
+        folder = Path(name) / "empty" / "work"
+        folder.mkdir(parents=True)
         for path, content in case.files.items():
             file = folder / path
             file.parent.mkdir(parents=True, exist_ok=True)
@@ -67,7 +68,7 @@ def _be_child(case: Case, folder: Path, out: int, err: int) -> None:
         resource.setrlimit(resource.RLIMIT_AS, (MEMORY, MEMORY))
         resource.setrlimit(resource.RLIMIT_CPU, (SECONDS, SECONDS + 5))
         resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
-        os.environ["XDG_CACHE_HOME"] = str(folder.parent / "soft-jig-fuzz-cache")
+        os.environ["XDG_CACHE_HOME"] = str(folder.parent.parent / "cache")
         for key, value in case.environment.items():
             os.environ.pop(key, None)
             if value is not None:

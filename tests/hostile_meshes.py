@@ -36,6 +36,12 @@ def obj_box(z: float = 0.0) -> bytes:
     return obj([(a, b, c + z) for a, b, c in CORNERS], FACES)
 
 
+def cube_as(kind: str) -> bytes:
+    """Return a cube of 20 mm in a format."""
+    data = trimesh.creation.box((20, 20, 20)).export(file_type=kind)
+    return data.encode() if isinstance(data, str) else bytes(data)  # type: ignore[arg-type]
+
+
 def mesh_cases() -> Iterator[CadCase]:
     """STL, OBJ and PLY."""
     for suffix in ("stl", "obj", "ply"):
@@ -85,8 +91,7 @@ def _obj_files() -> Iterator[tuple[str, bytes, tuple[int, ...]]]:
 
 
 def _stl_files() -> Iterator[tuple[str, bytes, tuple[int, ...]]]:
-    cube = trimesh.creation.box((20, 20, 20))
-    binary, text = cube.export(file_type="stl"), cube.export(file_type="stl_ascii").encode()
+    binary, text = cube_as("stl"), cube_as("stl_ascii")
     for count in (0, 1, 13, 10**6, 2**31 - 1, 2**32 - 1):
         yield f"STL {count} triangles stated", bytes(80) + struct.pack("<I", count), BAD
     yield "STL many stated, some there", bytes(80) + struct.pack("<I", 2**32 - 1) + binary[84:], BAD
@@ -102,7 +107,7 @@ def _stl_files() -> Iterator[tuple[str, bytes, tuple[int, ...]]]:
 
 
 def _ply_files() -> Iterator[tuple[str, bytes, tuple[int, ...]]]:
-    cube = trimesh.creation.box((20, 20, 20)).export(file_type="ply")
+    cube = cube_as("ply")
     header, _, data = cube.partition(b"end_header\n")
     for count in (0, 3, 10**9, -1, 2**63):
         for what, known in ((b"vertex", b"vertex 8"), (b"face", b"face 12")):

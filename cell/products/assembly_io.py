@@ -35,7 +35,7 @@ From 1.3 mm on, ``DEFLECTION`` asks for more: 109 facets on a hole of 12 mm."""
 
 CONVERTER = Path(__file__).with_name("step_to_gltf.py")
 
-# What converting a file may take in its process: [M] our largest products take ... of it.
+# What converting a file may take; [M] solids of plane faces take 0.8 s and 25 MB per MB.
 CPU_SECONDS, CPU_SECONDS_PER_MB = 40, 10.0
 MEMORY, MEMORY_PER_BYTE = 2 << 30, 100  # [byte]
 

@@ -10,7 +10,7 @@ import trimesh
 from pydrake.math import RigidTransform
 
 from cell.errors import BadPart, InputError, UnknownName
-from cell.paths import MODELS, is_file
+from cell.paths import MODELS, is_file, possible_path
 from cell.products.fields import one_of
 from cell.products.folder import CAD_SUFFIXES, Contents, read_file, read_folder
 from cell.products.identical import group_identical, identical_parts
@@ -65,7 +65,7 @@ def load_product(name_or_path: str | Path, options: ReadOptions | None = None) -
         meters_per_unit(options.units)  # A wrong name is an error even where no unit is needed.
     if options.depth is not None and options.depth < 1:
         raise InputError(f"--depth must be 1 or more, not {options.depth}.")
-    path = Path(name_or_path)
+    path = possible_path(name_or_path)
     if is_product_file(name_or_path):
         product = _from_product_file(name_or_path, options)
     elif path.is_dir():
@@ -88,7 +88,7 @@ def is_product_file(name_or_path: str | Path) -> bool:
 
 def require_product_file(name_or_path: str | Path) -> None:
     """Raise `InputError` for CAD, which can be planned but not assembled, with what works."""
-    path = Path(name_or_path)
+    path = possible_path(name_or_path)
     if is_product_file(name_or_path) or not path.exists():
         return  # What does not exist is named when it is read.
     if not path.is_dir() and path.suffix.lower() not in CAD_SUFFIXES:

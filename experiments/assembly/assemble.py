@@ -30,6 +30,7 @@ def run_job(job: Job) -> int:
     """
     console = Console(quiet=job.quiet, highlight=False)
     job.product.check_simulable()
+    start = None if job.start is None else read_resumable(job.start)
     fixing = plan(job.product, job.order, config=job.config)
     try:
         todo = _steps(job, fixing)
@@ -37,7 +38,6 @@ def run_job(job: Job) -> int:
         console.print(str(reason), markup=False, soft_wrap=True)
         write_infeasible(job, fixing, str(reason))
         return 1
-    start = None if job.start is None else read_resumable(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:
         console.print(f"Watch at {replay.url}", soft_wrap=True)
