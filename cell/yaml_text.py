@@ -21,10 +21,10 @@ MOST_VALUES = 100_000  # [A] Aliases written out in full.
 LONGEST_NUMBER = 40  # [A] Characters: twice what a double can tell apart.
 
 TAG = "tag:yaml.org,2002:"
-PLAIN: dict[str, set[str]] = {
-    "scalar": {TAG + kind for kind in ("null", "bool", "int", "float", "merge", "str")},
-    "sequence": {TAG + "seq"},
-    "mapping": {TAG + "map"},
+PLAIN: dict[type[yaml.Node], set[str]] = {
+    yaml.ScalarNode: {TAG + kind for kind in ("null", "bool", "int", "float", "merge", "str")},
+    yaml.SequenceNode: {TAG + "seq"},
+    yaml.MappingNode: {TAG + "map"},
 }
 
 
@@ -119,7 +119,7 @@ class _Bounds:
             return known
         if id(node) in self._around:
             raise self._error(node, "an alias that contains itself")
-        if node.tag not in PLAIN[node.id]:
+        if node.tag not in PLAIN[type(node)]:
             raise self._error(node, f"a value tagged '{node.tag}': only plain values are read")
         self._around.add(id(node))
         inner = [self.check(child) for child in self._children(node)]
