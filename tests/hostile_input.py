@@ -196,8 +196,11 @@ def product_forms() -> Iterator[Case]:
     for path in paths:
         case = product(f"mesh {path[:30]}", good.replace("a.obj", f'"{path}"'), ("mesh", "'a'"))
         yield Case(case.name, case.arguments, {**case.files, "folder.obj": None}, case.culprits)
-    for model in ("../motor", "../../etc/passwd", "motor.sdf", "hand_e/../motor"):
-        yield product(f"model {model}", f'parts: {{a: {{model: "{model}"}}}}', ("model",))
+    odd = ("../motor", "../../etc/passwd", "motor.sdf", "hand_e/../motor", "x" * 300, "/x.sdf")
+    for model in odd:
+        yield product(
+            f"model {model[:20]}", f'parts: {{a: {{model: "{model}"}}}}', ("model", "p.yaml")
+        )
     for step in ("1e-9", "1e-5", "0.1"):
         text = good.replace("every_deg: 90", f"every_deg: {step}")
         yield product(f"turns by {step} degrees", text, ("every_deg",))

@@ -6,7 +6,6 @@ import itertools
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path, PureWindowsPath
-from typing import Any
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
@@ -125,7 +124,7 @@ def _part_entries(fields: Fields, outside: bool) -> Iterator[tuple[str, Fields]]
         depths = itertools.accumulate(-1 if piece == ".." else 1 for piece in path.parts)
         if not outside and (path.anchor or min(depths, default=0) < 0):
             raise InputError(
-                f"{part.at('mesh')}: '{path}' is not in the product's folder; --outside allows it."
+                f"{part.at('mesh')}: '{path}' is not in the product's folder (--allow-outside)."
             )
         yield name, part
 

@@ -69,8 +69,8 @@ class Plan:
     no_cache: bool = False
     """Compute the matrices anew, and do not keep them in the user's cache."""
 
-    outside: bool = False
-    """Let a product file name meshes outside of its own folder."""
+    allow_outside: bool = False
+    """Let the product use meshes and models outside of the folder of its file."""
 
     explain: bool = False
     """Also print the matrices, every candidate, and which pair blocks which direction, where."""
@@ -120,7 +120,7 @@ class Plan:
                 leave_out=self.leave_out,
                 depth=self.depth,
                 tolerance=tolerance,
-                outside=self.outside,
+                outside=self.allow_outside,
             ),
             tolerance=tolerance,
             cache=None if self.no_cache else user_cache(),
