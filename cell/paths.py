@@ -7,7 +7,7 @@ from pathlib import Path
 from pydrake.multibody.parsing import Parser
 from pydrake.multibody.plant import MultibodyPlant
 
-from cell.errors import UnknownName
+from cell.errors import InputError, UnknownName
 
 MODELS = Path(__file__).resolve().parent.parent / "models"
 FILE_URL = "file://"
@@ -35,6 +35,34 @@ def package_above(file: Path) -> Path | None:
     """Return the nearest ``package.xml`` in the folders above a file; None if there is none."""
     found = (folder / "package.xml" for folder in file.resolve().parents)
     return next((candidate for candidate in found if candidate.is_file()), None)
+
+
+def possible_path(path: str | Path) -> Path:
+    """Return a path, whether or not there is anything.
+
+    Raises:
+        InputError: Nothing can be there: it is empty, too long, a loop of links, or holds a NUL.
+    """
+    try:
+        Path(path).stat()
+        reason = ""
+    except (FileNotFoundError, NotADirectoryError, PermissionError):
+        reason = ""
+    except OSError as error:
+        reason = error.strerror or str(error)
+    except ValueError as error:
+        reason = str(error)
+    if reason or not str(path).strip():
+        raise InputError(f"'{path}' is no path of a file: {reason or 'it is empty'}.")
+    return Path(path)
+
+
+def is_file(path: Path) -> bool:
+    """Return whether a path is a file; one that no file can have, too long or with NUL, is not."""
+    try:
+        return path.is_file()
+    except (OSError, ValueError):
+        return False
 
 
 def model_url(name: str) -> str:

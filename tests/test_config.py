@@ -145,7 +145,7 @@ def test_unknown_file_lists_the_known() -> None:
 def test_file_that_holds_no_sections_is_refused(tmp_path: Path, text: str) -> None:
     file = tmp_path / "bad.yaml"
     file.write_text(text)
-    with pytest.raises(BadSetting, match="bad.yaml") as caught:
+    with pytest.raises(InputError, match="bad.yaml") as caught:
         CellConfig.load(file)
     assert "\n" not in str(caught.value)
 

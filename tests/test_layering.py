@@ -20,6 +20,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "setting": set(),
         "forces": set(),
         "vectors": set(),
+        "yaml_text": {"errors"},
         "contact": set(),
         "sleep": {"contact"},
         "monitor": set(),
@@ -68,10 +69,13 @@ LAYERS: dict[str, dict[str, set[str]]] = {
     },
 }  # fmt: skip
 EVERYWHERE = {
-    "cell": {"bodies", "errors", "paths", "setting", "forces", "sleep", "vectors", "whole_file"},
+    "cell": {
+        "bodies", "errors", "paths", "setting", "forces", "sleep", "vectors", "whole_file",
+        "yaml_text",
+    },
     "planning": set(),
     "experiments": set(),
-}
+}  # fmt: skip
 EVERY_LAYER = [(package, layer) for package, layers in LAYERS.items() for layer in layers]
 MAX_LINES = 400  # A few screens: beyond that a file holds more than its name says.
 

@@ -76,6 +76,7 @@ class CellConfig:
 
         Raises:
             UnknownName: No such file or key, with those that exist.
+            InputError: The file cannot be read.
             BadSetting: A value that is impossible.
             BadJig: Numbers of the jig that contradict each other.
         """

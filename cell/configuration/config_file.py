@@ -6,11 +6,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-import yaml
-
-from cell.errors import UnknownName
-from cell.paths import MODELS
+from cell.errors import InputError, UnknownName
+from cell.paths import MODELS, is_file
 from cell.setting import BadSetting
+from cell.yaml_text import parse_yaml, read_yaml
 
 CONFIG_FOLDER = MODELS / "config"
 
@@ -20,18 +19,17 @@ def read_config_file(name_or_path: str | Path) -> dict[str, Any]:
 
     Args:
         name_or_path: A name in ``models/config``, or the path of a YAML file.
+
+    Raises:
+        InputError: There is none, or it cannot be read.
     """
     path = Path(name_or_path)
     if path.suffix not in (".yaml", ".yml"):
         path = CONFIG_FOLDER / f"{name_or_path}.yaml"
-    if not path.is_file():
+    if not is_file(path):
         known = [file.stem for file in CONFIG_FOLDER.glob("*.yaml")]
         raise UnknownName("configuration (name or .yaml file)", str(name_or_path), known)
-    try:
-        content = yaml.safe_load(path.read_text(encoding="utf-8"))
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise BadSetting(f"Configuration '{path}' is not YAML: {reason}.") from error
+    content = read_yaml(path)
     if not isinstance(content, dict | None):
         raise BadSetting(f"Configuration '{path}' must hold sections such as 'simulation:'.")
     return content or {}
@@ -61,6 +59,6 @@ def _split(text: str) -> tuple[str, Any]:
     if not equals or not path.strip():
         raise BadSetting(f"An override is written key=value, not '{text}'.")
     try:
-        return path.strip(), yaml.safe_load(value)
-    except yaml.YAMLError as error:
+        return path.strip(), parse_yaml(value, "It")
+    except InputError as error:
         raise BadSetting(f"'{path}': cannot read the value '{value}'.") from error

@@ -6,9 +6,10 @@ whatever the unit of the STEP file. Names are taken from the text of the STEP fi
 
 from __future__ import annotations
 
-import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import signal
+import subprocess
+import sys
+import tempfile
 from dataclasses import replace
 from pathlib import Path, PureWindowsPath
 
@@ -32,6 +33,12 @@ FACET_ANGLE = 0.25
 a sagitta of r/527, below the r/500 that counts as line to line even between parts of that size.
 From 1.3 mm on, ``DEFLECTION`` asks for more: 109 facets on a hole of 12 mm."""
 
+CONVERTER = Path(__file__).with_name("step_to_gltf.py")
+
+# What converting a file may take; [M] solids of plane faces take 0.8 s and 25 MB per MB.
+CPU_SECONDS, CPU_SECONDS_PER_MB = 40, 10.0
+MEMORY, MEMORY_PER_BYTE = 2 << 30, 100  # [byte]
+
 
 def load_assembly(file: Path, tolerance: float | None = None, above: tuple[Path, ...] = ()) -> Node:
     """Read a file as a tree, in its assembled pose [m]; what it refers to is read from beside it.
@@ -54,7 +61,7 @@ def load_assembly(file: Path, tolerance: float | None = None, above: tuple[Path,
     deflection = DEFLECTION
     if tolerance is not None:
         deflection = max(deflection, 1e3 * DEFLECTION_PER_TOLERANCE * tolerance)
-    binary = _converted(text.with_keys(), deflection)
+    binary = _converted(text.with_keys(), deflection, file)
     if not binary:
         raise InputError(f"'{file}' is not a STEP file that can be read.")
     tree = gltf_tree(binary, file)
@@ -159,26 +166,30 @@ def _authored(node: Node) -> Node:
     )
 
 
-def _converted(data: bytes, deflection: float) -> bytes:
-    """Return a STEP file as binary glTF, at a deflection [mm]; empty if it is not a STEP file."""
-    import cascadio  # Takes 0.1 s to load, which only STEP files need.
+def _converted(data: bytes, deflection: float, file: Path) -> bytes:
+    """Return a STEP file as binary glTF, at a deflection [mm]; empty if it is not a STEP file.
 
-    with _without_output():
-        return cascadio.load(
-            data, tol_linear=deflection, tol_angular=FACET_ANGLE, use_parallel=False
+    Raises:
+        InputError: The reader crashes on it, or takes more time or memory than it may.
+    """
+    seconds = CPU_SECONDS + int(CPU_SECONDS_PER_MB * 1e-6 * len(data))
+    memory = MEMORY + MEMORY_PER_BYTE * len(data)
+    with tempfile.TemporaryDirectory(prefix="soft-jig-") as folder:
+        result = Path(folder) / "result.glb"
+        limits = map(str, (deflection, FACET_ANGLE, seconds, memory, result))
+        # -P: the folder of the script holds modules with the names of others.
+        done = subprocess.run(
+            [sys.executable, "-P", CONVERTER, *limits], input=data, capture_output=True, check=False
         )
-
-
-@contextmanager
-def _without_output() -> Iterator[None]:
-    """Discard what OpenCASCADE writes to the process's standard streams."""
-    with open(os.devnull, "w") as null:
-        saved = [os.dup(stream) for stream in (1, 2)]
-        try:
-            for stream in (1, 2):
-                os.dup2(null.fileno(), stream)
-            yield
-        finally:
-            for stream, copy in zip((1, 2), saved, strict=True):
-                os.dup2(copy, stream)
-                os.close(copy)
+        if done.returncode == 0:
+            return result.read_bytes()
+    gigabytes = memory / 2**30
+    reasons = {-signal.SIGXCPU: f"takes longer than {seconds} s", -signal.SIGKILL: "was killed"}
+    if b"MemoryError" in done.stderr or b"bad_alloc" in done.stderr:
+        reason = f"takes more than {gigabytes:.1f} GB"
+    elif done.returncode < 0:
+        name = signal.Signals(-done.returncode).name
+        reason = reasons.get(done.returncode, f"crashes ({name})")
+    else:
+        reason = (done.stderr.decode(errors="replace").strip().splitlines() or ["fails"])[-1]
+    raise InputError(f"'{file}' cannot be read: the reader of STEP files {reason}.")

@@ -99,6 +99,8 @@ def bodies_of(surface: trimesh.Trimesh) -> Bodies:
             shells.append(shell)
         else:
             rejected.append(Rejected("encloses no volume"))
+    if not shells and not rejected:  # All faces were degenerate.
+        rejected.append(Rejected("encloses no volume"))
     solids, turned = _with_cavities(shells)
     whole = surface if apart.sound and not rejected and not turned else None
     return Bodies(tuple(solids), tuple(rejected), apart.repair, whole)

@@ -9,6 +9,12 @@ import numpy as np
 
 from cell.errors import InputError, UnknownName
 
+LARGEST = 1e9
+"""[A] Size of a number in a product file, whatever its unit: squares and cubes stay finite."""
+
+SMALLEST = 1e-9
+"""[A] A number above zero is at least that large, whatever its unit."""
+
 
 class Fields:
     """A mapping all of whose keys are known.
@@ -48,15 +54,16 @@ class Fields:
         if default is not None and key not in self._data:
             return default
         value = self.raw(key)
-        if not isinstance(value, str):
+        if not isinstance(value, str) or not value.strip():
             raise InputError(f"{self.at(key)}: expected text, got {value!r}.")
         return value
 
     def positive(self, key: str) -> float:
         """Return a required number above zero."""
         value = _number(self.raw(key), self.at(key))
-        if not value > 0.0:
-            raise InputError(f"{self.at(key)}: expected a number above zero, got {value:g}.")
+        if not value >= SMALLEST:
+            at_least = "above zero" if value <= 0.0 else f"of at least {SMALLEST:g}"
+            raise InputError(f"{self.at(key)}: expected a number {at_least}, got {value:g}.")
         return value
 
     def vector(self, key: str) -> np.ndarray:
@@ -70,7 +77,7 @@ class Fields:
         """Return a required vector (3,), normalised."""
         vector = self.vector(key)
         length = float(np.linalg.norm(vector))
-        if length == 0.0:
+        if length < SMALLEST:
             raise InputError(f"{self.at(key)}: the zero vector has no direction.")
         return vector / length
 
@@ -93,6 +100,8 @@ def mapping_at(value: Any, where: str) -> Mapping[str, Any]:
     for key in value:
         if not isinstance(key, str):
             raise InputError(f"{where}: the key {key!r} is not a name; put it in quotes.")
+        if not key.strip():
+            raise InputError(f"{where}: a name is empty.")
     return value
 
 
@@ -111,6 +120,10 @@ def one_of(kind: str, name: str, known: Collection[str]) -> str:
 
 
 def _number(value: Any, where: str) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not np.isfinite(value):
+    if isinstance(value, bool) or not isinstance(value, int | float) or value != value:
         raise InputError(f"{where}: expected a number, got {value!r}.")
+    if abs(value) > LARGEST:
+        raise InputError(
+            f"{where}: expected a number of at most {LARGEST:g} in size, got {value!r}."
+        )
     return float(value)

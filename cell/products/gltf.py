@@ -13,13 +13,16 @@ import numpy as np
 import trimesh
 
 from cell.errors import InputError
-from cell.products.surfaces import joined, merged
+from cell.products.surfaces import FARTHEST, joined, merged
 from cell.products.tree import Node, Surface
 
 TRIANGLES, TRIANGLE_STRIP = 4, 5
 
 LARGEST_INTEGER = {5120: 127.0, 5121: 255.0, 5122: 32767.0, 5123: 65535.0}
 """What a normalised integer of each component type counts as one [R] (glTF 2.0, 3.11)."""
+
+MOST_NODES = 100_000
+"""[A] Instances in a file, twenty times the parts that are planned."""
 
 COMPRESSED = {
     "KHR_draco_mesh_compression": "is compressed with Draco",
@@ -45,12 +48,52 @@ def gltf_tree(data: bytes, file: Path) -> Node:
             raise ValueError("not binary glTF")
         header = json.loads(data[20 : 20 + size])
         _refuse_compression(header, file)
+        _check_counts(header, len(data), file)
         surfaces = _surfaces(header, data[20 + size :])
         return Node(children=tuple(_children(header, _roots(header), np.eye(4), surfaces)))
     except InputError:
         raise
     except Exception as error:  # The reader documents no exceptions of its own.
         raise InputError(f"'{file}' is not a glTF file that can be read.") from error
+
+
+def gltf_surface(data: bytes, file: Path) -> trimesh.Trimesh:
+    """Return everything in a binary glTF file as one surface [m], as `gltf_tree` reads it."""
+
+    def placed(node: Node) -> Iterator[trimesh.Trimesh]:
+        for surface in node.surfaces:
+            yield surface.mesh.copy().apply_transform(surface.X_AP)
+        for child in node.children:
+            yield from placed(child)
+
+    return joined([trimesh.Trimesh(), *placed(gltf_tree(data, file))])
+
+
+def _check_counts(header: Mapping[str, Any], size: int, file: Path) -> None:
+    """Refuse a file whose content would outgrow any memory.
+
+    Args:
+        header: Of the file.
+        size: Of its binary part [byte].
+        file: For messages.
+
+    Raises:
+        InputError: An accessor has more items than the file has bytes, or nodes that are repeated
+            in nodes that are repeated add up to more than `MOST_NODES`.
+    """
+    for k, accessor in enumerate(header.get("accessors", [])):
+        if not 0 <= accessor["count"] <= size:
+            raise InputError(f"'{file}' says that accessor {k} has {accessor['count']} items.")
+    nodes, counts = header.get("nodes", []), {}
+
+    def count(index: int) -> int:
+        if index not in counts:
+            counts[index] = MOST_NODES  # While it is counted: in a circle it never ends.
+            counts[index] = 1 + sum(map(count, nodes[index].get("children", [])))
+        return counts[index]
+
+    if sum(map(count, _roots(header))) > MOST_NODES:
+        raise InputError(f"'{file}' has more than {MOST_NODES} nodes, or nodes in a circle.")
 
 
 def _refuse_compression(header: Mapping[str, Any], file: Path) -> None:
@@ -151,6 +194,8 @@ def _children(
     for index in indices:
         entry = header["nodes"][index]
         X_AP = X_AF @ _pose(entry)
+        if not np.abs(X_AP).max() <= FARTHEST:
+            raise ValueError("a pose that is no place")
         given, product, own = str(entry.get("name", "")), "", ()
         if "mesh" in entry:
             product = str(header["meshes"][entry["mesh"]].get("name", ""))

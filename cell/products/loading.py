@@ -10,7 +10,7 @@ import trimesh
 from pydrake.math import RigidTransform
 
 from cell.errors import BadPart, InputError, UnknownName
-from cell.paths import MODELS
+from cell.paths import MODELS, is_file, possible_path
 from cell.products.fields import one_of
 from cell.products.folder import CAD_SUFFIXES, Contents, read_file, read_folder
 from cell.products.identical import group_identical, identical_parts
@@ -37,6 +37,9 @@ DEFAULT_DENSITY = 2700.0
 MANY_PARTS = 500
 """[M] 500 parts with 374 000 triangles take 46 s of CPU, 9 s of it for C and M_j, and 0.7 GB."""
 
+MOST_PARTS = 5000
+"""[D] The matrices take 112 bytes per pair of parts: 2.8 GB."""
+
 SHOWN = 12
 """[A] names in one remark: about two lines."""
 
@@ -62,14 +65,14 @@ def load_product(name_or_path: str | Path, options: ReadOptions | None = None) -
         meters_per_unit(options.units)  # A wrong name is an error even where no unit is needed.
     if options.depth is not None and options.depth < 1:
         raise InputError(f"--depth must be 1 or more, not {options.depth}.")
-    path = Path(name_or_path)
+    path = possible_path(name_or_path)
     if is_product_file(name_or_path):
         product = _from_product_file(name_or_path, options)
     elif path.is_dir():
         product = _from_cad(path.resolve().name, read_folder(path, options), options)
     elif path.suffix.lower() not in CAD_SUFFIXES:
         raise _unsupported(path)
-    elif not path.is_file():
+    elif not is_file(path):
         raise InputError(f"No product file '{path}'.")
     else:
         product = _from_cad(path.stem, read_file(path, options), options)
@@ -85,7 +88,7 @@ def is_product_file(name_or_path: str | Path) -> bool:
 
 def require_product_file(name_or_path: str | Path) -> None:
     """Raise `InputError` for CAD, which can be planned but not assembled, with what works."""
-    path = Path(name_or_path)
+    path = possible_path(name_or_path)
     if is_product_file(name_or_path) or not path.exists():
         return  # What does not exist is named when it is read.
     if not path.is_dir() and path.suffix.lower() not in CAD_SUFFIXES:
@@ -108,7 +111,7 @@ def _needs_unit(path: Path) -> bool:
 def _from_product_file(name_or_path: str | Path, options: ReadOptions) -> Product:
     known = str(name_or_path) in product_names()
     file = PRODUCTS / f"{name_or_path}.yaml" if known else Path(name_or_path)
-    if not file.is_file():
+    if not is_file(file):
         raise InputError(f"No product file '{file}'.")
     if options.units is not None:
         raise InputError(f"'{file.name}' states its own units; --units is for CAD.")
@@ -136,6 +139,8 @@ def _unsupported(path: Path) -> InputError:
 def _from_cad(name: str, contents: Contents, options: ReadOptions) -> Product:
     """Return a product that can only be planned: no orders, joints or models."""
     named = list(named_parts(contents.tree, name))
+    if len(named) > MOST_PARTS:
+        raise InputError(f"'{name}' has {len(named)} parts; up to {MOST_PARTS} can be planned.")
     parts = parts_of(named, split=options.split, leave_out=options.leave_out)
     left_out = tuple(dict.fromkeys((*contents.left_out, *parts.left_out)))
     everything = dict.fromkeys([*parts.meshes, *(leaf for leaf, _ in named)])

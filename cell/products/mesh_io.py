@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
+import io
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import trimesh
 
-from cell.errors import BadPart, UnknownName
+from cell.errors import BadPart, InputError, UnknownName
+from cell.paths import is_file
 from cell.products.bodies import bodies_of
-from cell.products.surfaces import merged
+from cell.products.gltf import gltf_surface
+from cell.products.surfaces import joined, merged
 
 METERS_PER_UNIT = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 25.4e-3}
 """Metres per CAD unit, by the name used on the command line."""
@@ -52,12 +55,15 @@ def load_mesh(path: Path, name: str, units: str | None = None) -> trimesh.Trimes
     Raises:
         BadPart: If it is missing, unreadable, open or flat.
     """
-    if not path.is_file():
+    if not is_file(path):
         raise BadPart(name, f"no mesh file '{path}'")
     if path.suffix.lower() not in MESH_SUFFIXES:
         raise BadPart(name, f"'{path.name}' is not one of {', '.join(MESH_SUFFIXES)}")
     default = "m" if path.suffix.lower() in UNIT_SUFFIXES else "mm"
-    mesh = _read(path, name)
+    surfaces = [mesh for mesh in _surfaces(path, name).values() if len(mesh.faces)]
+    if not surfaces:
+        raise BadPart(name, f"'{path.name}' holds no surface")
+    mesh = surfaces[0] if len(surfaces) == 1 else merged(joined(surfaces))
     mesh.apply_scale(meters_per_unit(units or default))
     bodies = bodies_of(mesh)
     if bodies.rejected:
@@ -76,19 +82,10 @@ def load_surfaces(path: Path, name: str) -> list[tuple[str, trimesh.Trimesh]]:
         BadPart: It cannot be read.
     """
     by = _objects(path) if path.suffix.lower() == ".obj" else {}
-    if path.suffix.lower() == ".stl":
-        _check_length(path, name)
-    try:
-        scene = trimesh.load_scene(path, process=False, **by)
-    except Exception as error:  # The readers of the formats share no exception type.
-        raise BadPart(name, f"'{path.name}' cannot be read ({_why(error)})") from error
-    shapes = {str(n): g for n, g in scene.geometry.items() if isinstance(g, trimesh.Trimesh)}
-    if not shapes:
-        return [("", trimesh.Trimesh())]
-    if len(shapes) == 1:
-        return [("", merged(shape)) for shape in shapes.values()]
-    listed = reversed(shapes.items()) if by else shapes.items()  # The reader goes backwards.
-    return [(label, merged(shape)) for label, shape in listed]
+    found = _surfaces(path, name, **by)
+    if len(found) < 2:
+        return [("", next(iter(found.values()), trimesh.Trimesh()))]
+    return list(reversed(found.items()) if by else found.items())  # The reader goes backwards.
 
 
 def _check_length(path: Path, name: str) -> None:
@@ -129,16 +126,29 @@ def _objects(path: Path) -> dict[str, Any]:
     return plain | {"split_groups": True} if len(found[b"g"]) > 1 else plain
 
 
-def _read(path: Path, name: str) -> trimesh.Trimesh:
-    """Return the file's surface with coincident vertices merged, in the file's unit."""
+def _surfaces(path: Path, name: str, **options: Any) -> dict[str, trimesh.Trimesh]:
+    """Return a file's surfaces by name, each with coincident vertices merged, in the file's unit.
+
+    The reader gets the content and not the path: materials and textures that a file refers to are
+    not needed, and may lie anywhere.
+    """
+    if path.suffix.lower() == ".stl":
+        _check_length(path, name)
     try:
-        mesh = trimesh.load_mesh(path, process=False)
+        data = path.read_bytes()
+        if path.suffix.lower() == ".glb":
+            return {"": merged(gltf_surface(data, path))}
+        content, kind = io.BytesIO(data), path.suffix[1:].lower()
+        scene = trimesh.load_scene(content, file_type=kind, process=False, **options)
+        return {
+            str(label): merged(shape)
+            for label, shape in scene.geometry.items()
+            if isinstance(shape, trimesh.Trimesh)
+        }
+    except InputError:
+        raise
     except Exception as error:  # The readers of the formats share no exception type.
         raise BadPart(name, f"'{path.name}' cannot be read ({_why(error)})") from error
-    mesh = mesh.to_mesh() if isinstance(mesh, trimesh.Scene) else mesh
-    if not isinstance(mesh, trimesh.Trimesh):
-        raise BadPart(name, f"'{path.name}' holds no surface")
-    return merged(mesh)
 
 
 def obj_text(mesh: trimesh.Trimesh, *, normals: bool = False) -> str:

@@ -12,7 +12,7 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from cell.errors import InputError, UnknownName
-from cell.paths import FILE_URL, MODELS, model_folder, model_names, package_above
+from cell.paths import FILE_URL, MODELS, is_file, model_folder, model_names, package_above
 
 OWN_MODELS = "models"
 """Folder of a user's models, beside their product file."""
@@ -66,18 +66,18 @@ def find_model(name: str, product: Path, *, outside: bool = False) -> ModelFile:
     folder = product.parent.resolve()
     if name.endswith(".sdf"):
         sdf = folder / name
-        if not sdf.is_file():
+        if not is_file(sdf):
             raise InputError(f"{product.name}: no model file '{sdf}'.")
     else:
         sdf = folder / OWN_MODELS / name / f"{name}.sdf"
-        if not sdf.is_file():
+        if not is_file(sdf):
             return _of_package(name, folder)
     _require_inside(sdf, folder, outside, product.name)
     for element in _root(sdf).iter("uri"):
         referred = _referred(element.text or "", sdf)
         if referred is None:
             continue
-        if not referred.is_file():
+        if not is_file(referred):
             raise InputError(f"'{sdf}': its mesh '{element.text}' is missing.")
         _require_inside(referred, folder, outside, sdf.name)
     return ModelFile(f"{FILE_URL}{sdf.resolve()}", sdf.resolve())

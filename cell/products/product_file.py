@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+import itertools
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from pathlib import Path
-from typing import Any
+from pathlib import Path, PureWindowsPath
 
 import numpy as np
-import yaml
 from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell.errors import BadOrder, BadPart, InputError
@@ -17,6 +16,7 @@ from cell.products.joints import read_joints
 from cell.products.mesh_io import LARGEST_PART, load_mesh
 from cell.products.model_files import find_model
 from cell.products.product import Grasp, Part, Product
+from cell.yaml_text import read_yaml
 
 PRODUCT_KEYS = (
     "name",
@@ -38,6 +38,7 @@ POSE_KEYS = ("xyz_mm", "rpy_deg")
 GRASP_KEYS = ("name", "jaw", "at_mm", "closing", "approach", "width_mm", "force_N", "turn")
 TURN_KEYS = ("axis", "every_deg")
 JAWS = ("tip", "wide", "nose")
+LEAST_TURN = 1.0  # [deg] [A] Between two grasps: 360 of them are tried in seconds.
 AXES = ("+x", "-x", "+y", "-y", "+z", "-z")
 
 
@@ -45,23 +46,21 @@ def read_product(file: Path, *, outside: bool = False) -> Product:
     """Return the product that a YAML file describes.
 
     Args:
-        file: The YAML file.
-        outside: Whether models may lie outside of its folder; see `find_model`.
+        file: The product file; models and meshes are looked up from its folder.
+        outside: Whether they may lie outside of that folder; see `find_model`.
 
     Raises:
         InputError: Or one of its children, with the place in the file.
     """
-    data = mapping_at(_load_yaml(file), file.name)
+    data = mapping_at(read_yaml(file), file.name)
     for old, new in REPLACED_KEYS.items():
         if old in data:
             raise InputError(f"{file.name}: '{old}' is not a key any more; use {new}.")
     fields = Fields(data, file.name, PRODUCT_KEYS)
     units = fields.text("units", "mm")
     parts = {
-        name: _part(
-            name, Fields(entry, fields.at(f"parts.{name}"), PART_KEYS), file, units, outside
-        )
-        for name, entry in fields.mapping("parts").items()
+        name: _part(name, entry, file, units, outside)
+        for name, entry in _part_entries(fields, outside)
     }
     if not parts:
         raise InputError(f"{file.name}: a product has at least one part.")
@@ -80,44 +79,6 @@ def read_product(file: Path, *, outside: bool = False) -> Product:
     # Joints and orders refer to parts and groups by name.
     joints = read_joints(fields.entries("joints"), product)
     return replace(product, joints=joints, orders=_orders(fields, product))
-
-
-class _Loader(yaml.SafeLoader):
-    """A safe loader that refuses repeated keys, and reads words such as ``on`` as text.
-
-    YAML 1.1 takes on, off, yes and no for booleans, of which product files have none.
-    """
-
-    yaml_implicit_resolvers = {
-        first: [(tag, pattern) for tag, pattern in resolvers if tag != "tag:yaml.org,2002:bool"]
-        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
-    }
-
-
-def _construct_mapping(loader: _Loader, node: yaml.MappingNode) -> dict[Any, Any]:
-    keys = [str(key.value) for key, _ in node.value if key.tag != "tag:yaml.org,2002:merge"]
-    repeated = {key for key in keys if keys.count(key) > 1}
-    place = f"{node.start_mark.name}, line {node.start_mark.line + 1}"
-    if repeated:
-        raise InputError(f"{place}: '{min(repeated)}' occurs twice.")
-    if not all(isinstance(key, yaml.ScalarNode) for key, _ in node.value):
-        raise InputError(f"{place}: a key is a name, not a list.")
-    loader.flatten_mapping(node)
-    return dict(loader.construct_pairs(node, deep=True))
-
-
-_Loader.add_constructor(yaml.resolver.BaseResolver.DEFAULT_MAPPING_TAG, _construct_mapping)
-
-
-def _load_yaml(file: Path) -> Any:
-    try:
-        with file.open() as stream:
-            return yaml.load(stream, Loader=_Loader)
-    except OSError as error:
-        raise InputError(f"'{file}' cannot be read: {error.strerror}.") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
-        reason = " ".join(str(error).split())
-        raise InputError(f"'{file}' is not valid YAML: {reason}.") from error
 
 
 def _groups(fields: Fields, parts: Mapping[str, Part]) -> dict[str, tuple[str, ...]]:
@@ -149,6 +110,23 @@ def _orders(fields: Fields, product: Product) -> tuple[tuple[str, ...], ...]:
                 f"{', '.join(product.items())} once."
             )
     return orders
+
+
+def _part_entries(fields: Fields, outside: bool) -> Iterator[tuple[str, Fields]]:
+    """Yield every part's name and entry, with its mesh in the product file's folder.
+
+    A product file may come from anybody: it has no business elsewhere, unless it is told so. Links
+    are followed.
+    """
+    for name, entry in fields.mapping("parts").items():
+        part = Fields(entry, fields.at(f"parts.{name}"), PART_KEYS)
+        path = PureWindowsPath(part.text("mesh", "."))  # It splits at both kinds of slashes.
+        depths = itertools.accumulate(-1 if piece == ".." else 1 for piece in path.parts)
+        if not outside and (path.anchor or min(depths, default=0) < 0):
+            raise InputError(
+                f"{part.at('mesh')}: '{path}' is not in the product's folder (--allow-outside)."
+            )
+        yield name, part
 
 
 def _part(name: str, fields: Fields, file: Path, units: str, outside: bool) -> Part:
@@ -217,6 +195,8 @@ def _grasps(fields: Fields) -> list[Grasp]:
         return [grasp]
     turn = Fields(fields.raw("turn"), fields.at("turn"), TURN_KEYS)
     axis, step = turn.direction("axis"), turn.positive("every_deg")
+    if step < LEAST_TURN:
+        raise InputError(f"{turn.at('every_deg')}: expected {LEAST_TURN:g} or more, got {step:g}.")
     return [
         replace(
             grasp,

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 @dataclass(frozen=True)
 class ReadOptions:
-    """How CAD files become a product; a product file (YAML) states all of this but `group` itself.
+    """How CAD files become a product; a product file (YAML) states most of this itself.
 
     Attributes:
         units: "mm", "cm", "m" or "in": unit of files that state none. Where all of them state
@@ -21,7 +21,7 @@ class ReadOptions:
             makes every part an item.
         tolerance: Gap up to which parts count as touching [m], if it is given: STEP is then
             tessellated as coarsely as it allows. None for finely.
-        outside: Whether a product file may use models outside of its folder.
+        outside: Whether a product file may name models and meshes outside of its own folder.
     """
 
     units: str | None = None

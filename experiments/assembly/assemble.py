@@ -44,6 +44,7 @@ def run_job(job: Job) -> int:
         check_recordable()
     if job.program is not None and job.start is not None:
         raise InputError("A program begins with the first step: leave out --program or --start.")
+    start = None if job.start is None else read_resumable(job.start)
     fixing = plan(job.product, job.order, config=job.config)
     try:
         todo = planned = _steps(job, fixing)
@@ -52,7 +53,6 @@ def run_job(job: Job) -> int:
         write_infeasible(job, fixing, str(reason))
         return 1
     job = replace(job, config=with_fixture_for(job.config, job.product, job.seed, todo))
-    start = None if job.start is None else read_resumable(job.start)
     replay = Replay(view=job.view, file=job.replay)
     if replay.url:
         console.print(f"Watch at {replay.url}", soft_wrap=True)

@@ -43,7 +43,7 @@ class Progress:
 
     def phase(self, name: str) -> None:
         """Show which phase runs."""
-        self.bar.update(self.task, description=f"{name:30s}")
+        self.bar.update(self.task, description=escape(f"{name:30s}"))
         if self.console.is_terminal:
             self.console.print(f"  {name}", markup=False)
 
@@ -66,5 +66,5 @@ def result_table(steps: Sequence[StepResult]) -> Table:
             for check in step.failed_checks
         ]
         seconds = f"{step.sim_seconds:.1f}", f"{step.cpu_seconds:.1f}"
-        table.add_row(step.name, step.verdict, *seconds, "\n".join(failed))
+        table.add_row(escape(step.name), step.verdict, *seconds, escape("\n".join(failed)))
     return table

@@ -112,7 +112,9 @@ class Replay:
     def __init__(self, *, view: bool, file: Path | None) -> None:
         self.view, self.file = view, file
         logging.getLogger("drake").setLevel(logging.WARNING)  # Meshcat reports its port.
-        self.meshcat = Meshcat(MeshcatParams(show_stats_plot=False)) if view or file else None
+        # Not on the network: whoever can open the page can also send commands to it.
+        params = MeshcatParams(host="localhost", show_stats_plot=False)
+        self.meshcat = Meshcat(params) if view or file else None
         self.film: MembraneFilm | None = None
         self._drawn: Simulation | None = None
 

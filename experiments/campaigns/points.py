@@ -6,11 +6,10 @@ import itertools
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-import yaml
-
 from cell.configuration.config import CellConfig
 from cell.configuration.sections import entries
 from cell.errors import InputError, UnknownName
+from cell.yaml_text import parse_yaml
 from experiments.campaigns.catalogue import Experiment, Function, experiment_named, name_of
 from experiments.campaigns.code_version import code_digest, trial_key
 from experiments.campaigns.trial import Trial
@@ -85,8 +84,8 @@ def parse_grid(texts: Sequence[str]) -> dict[str, list[Any]]:
     for text in texts:
         name, equals, values = text.partition("=")
         try:
-            axes[name.strip()] = yaml.safe_load(f"[{values}]") if equals else []
-        except yaml.YAMLError:
+            axes[name.strip()] = parse_yaml(f"[{values}]", "It") if equals else []
+        except InputError:
             axes[name.strip()] = []
         if not name.strip() or not axes[name.strip()]:
             raise InputError(f"--grid {text}: write it like jig.vacuum.pressure=30e3,60e3,90e3.")

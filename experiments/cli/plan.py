@@ -69,6 +69,9 @@ class Plan:
     no_cache: bool = False
     """Compute the matrices anew, and do not keep them in the user's cache."""
 
+    allow_outside: bool = False
+    """Let the product use meshes and models outside of the folder of its file."""
+
     explain: bool = False
     """Also print the matrices, every candidate, and which pair blocks which direction, where."""
 
@@ -117,6 +120,7 @@ class Plan:
                 leave_out=self.leave_out,
                 depth=self.depth,
                 tolerance=tolerance,
+                outside=self.allow_outside,
             ),
             tolerance=tolerance,
             cache=None if self.no_cache else user_cache(),

@@ -9,6 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 
 from planning.operations.plot import Plot
 
@@ -75,7 +76,9 @@ def _png(figure: Figure, axes: Axes) -> bytes:
 
 
 def figure_png(figure: Figure) -> bytes:
-    """Return a figure as a PNG."""
+    """Return a figure as a PNG; a dollar sign in a name is a character, and begins no formula."""
+    for text in figure.findobj(Text):
+        text.set_parse_math(False)
     buffer = io.BytesIO()
     FigureCanvasAgg(figure).print_png(buffer)
     return buffer.getvalue()

@@ -37,10 +37,16 @@ LIBRARIES = ("manifold3d", "numpy", "python-fcl", "scipy", "trimesh")  # What co
 CHECKSUM = "checksum"  # Of a file, over everything else in it.
 
 
-def user_cache() -> Path:
-    """Return the user's cache folder: ``$XDG_CACHE_HOME/soft-jig``, or ``~/.cache/soft-jig``."""
+def user_cache() -> Path | None:
+    """Return the user's cache folder: ``$XDG_CACHE_HOME/soft-jig``, or ``~/.cache/soft-jig``.
+
+    None for a user without a home, as in containers.
+    """
     root = os.environ.get("XDG_CACHE_HOME")
-    return (Path(root) if root else Path.home() / ".cache") / "soft-jig"
+    try:
+        return (Path(root) if root else Path.home() / ".cache") / "soft-jig"
+    except RuntimeError:
+        return None
 
 
 def cached_matrices(
