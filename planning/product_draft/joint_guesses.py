@@ -22,11 +22,13 @@ Features = Mapping[str, Sequence[Cylinder]]  # By name of the part.
 HEAD_WIDER = 1.3  # [A] Than the shank: the smallest of any standard is 1.5.
 COAXIAL = 0.1  # [A] Of the radius: parts are drawn where they belong.
 THREAD = 1.02  # [A] Hole over shank up to which it is threaded: clearance holes begin at 1.06.
-TAPPED = 0.75  # [R] ISO 2306: tap drills are 0.78 (M2) to 0.84 (M6) of the diameter.
+TAPPED = 0.75  # [D] Below d - P of every size: tap drills are 0.78 (M2) to 0.84 (M6) of the diameter.
 CLEARANCE_HOLE = 1.5  # [A] Hole over shank from which nothing guides it.
 LOOSEST_FIT, LOOSEST = 0.12, 3e-4  # [M] Clearance of a fit: share of the radius, and [m] on top.
 LINE_TO_LINE = 5e-6  # [A] Clearance below which a fit is drawn without one [m].
-SLIDING = 2e-5  # [R] ISO 286: H7/g6 has 6 to 41 um between 10 and 18 mm, on the diameter [m].
+# [A] Radially, where none is drawn: near the wide end of H7/g6, 5 to 28 um in diameter at 10 mm and
+# 7 to 41 um at 25 mm [R machinecalcs.com, ISO 286 fit table] [m].
+SLIDING = 2e-5
 TIGHTEST_PRESS = 0.02  # [A] Interference of a press fit, of the radius.
 
 
