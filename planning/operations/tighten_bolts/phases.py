@@ -166,15 +166,15 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
 def foresee(station: Station, step: Step) -> tuple[str, ...]:
     """See whether the driver reaches every bolt, beside the hand that holds against it."""
     clamped = station.cell.product.screws[step.parts[0]].clamps
+    holds = station.config.driver.counter_hold
+    if holds and any(_leaves_room(station, step.parts, r) for r in from_the_side(station, clamped)):
+        return ()
     away = {station.holder.name: station.holder.home}
     for bolt in step.parts:
         if not ways_above(station, bolt, away):
             _above(station, bolt, away)  # Raises what is said of it.
-    if not station.config.driver.counter_hold:
+    if not holds:
         return ()
-    for reach in from_the_side(station, clamped):
-        if _leaves_room(station, step.parts, reach):
-            return ()
     alone = "leaves room for the driver: the jig alone bears the torque"
     return (f"no grasp of '{clamped}' from the side {alone}",)
 
