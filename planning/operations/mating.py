@@ -97,7 +97,8 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     """
     arm, part = station.holder, mating.part
     held = frozenset([part, *riders])
-    both = held | {mating.on}
+    # What bears the part that it comes to has to be there, too: nothing stands on what sleeps.
+    both = held | {mating.on, *station.fixed}
     yield from look(station, MatePhase.LOOK, part)
     X_WGoal = goal_pose(station, mating)
     reach = first(useful_grasps(station, mating, X_WGoal), part, station)
