@@ -82,9 +82,7 @@ def bar_puzzle(clearance: float = 0.25) -> dict[str, Manifold]:
 
 def _peg(z: float) -> Manifold:
     """Return a peg that stands at a height, rooted in what is below it."""
-    return boss(4.0, 0.0, 8.0, 0.8, FACETS).translate([0, 0, z]) + cylinder(
-        4.0, z - 1.0, z, FACETS
-    )
+    return boss(4.0, 0.0, 8.0, 0.8, FACETS).translate([0, 0, z]) + cylinder(4.0, z - 1.0, z, FACETS)
 
 
 def _socket(z: float, clearance: float) -> Manifold:

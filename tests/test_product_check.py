@@ -8,7 +8,8 @@ import pytest
 from drawn_products import covered_block, write_meshes
 
 from cell.configuration.config import CellConfig
-from cell.products.joints import Rest
+from cell.products.drives import Drive
+from cell.products.joints import Rest, Screw
 from cell.products.loading import load_product
 from cell.products.product import Grasp, Part, Product
 from experiments.cli.main import main
@@ -73,6 +74,36 @@ def test_torque_beyond_the_driver(product: Product) -> None:
     found = said(machine_findings(replace(product, joints=joints), CONFIG), Level.FAILS)
     assert "screw_1, screw_2: 1.2 N m, and the driver gives" in found
     assert said(machine_findings(product, CONFIG), Level.FAILS) == ""
+
+
+def with_drives(product: Product, *names: str) -> Product:
+    """Return a product whose screws have these drives, in their order."""
+    drives = dict(zip(product.screws, map(Drive, names), strict=True))
+    joints = tuple(
+        replace(joint, drive=drives[joint.part]) if isinstance(joint, Screw) else joint
+        for joint in product.joints
+    )
+    return replace(product, joints=joints)
+
+
+def test_each_screw_is_turned_by_the_bit_of_its_head(product: Product) -> None:
+    """An M4 cap screw: its socket, 2 mm deep, is in a head of 4 mm [R] ISO 4762."""
+    for screw in product.screws.values():
+        assert screw.drive == Drive("hex 3")
+        assert screw.bit_seat == pytest.approx(2e-3, abs=1e-6)
+
+
+def test_a_drive_that_no_bit_fits(product: Product) -> None:
+    wrong = with_drives(product, "hex 3", "hex 17")
+    found = said(machine_findings(wrong, CONFIG), Level.FAILS)
+    assert "screw_2: no bit fits 'hex 17'; there are hex 1.5," in found
+
+
+def test_drives_that_need_several_bits(product: Product) -> None:
+    several = with_drives(product, "hex 3", "cross 2")
+    assert "hex 3 for screw_1; cross 2 for screw_2" in said(
+        machine_findings(several, CONFIG), Level.DOUBTFUL
+    )
 
 
 def test_a_part_too_heavy_for_the_arm(product: Product) -> None:

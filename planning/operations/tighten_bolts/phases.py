@@ -25,7 +25,6 @@ from cell.simulation.phase import (
     after,
     motion_finished,
 )
-from cell.workpieces.thread import BIT_SEAT
 from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
 from planning.operations.counter_hold import Coming, from_the_side, hold, park
@@ -285,8 +284,9 @@ def _awake(station: Station, *bolts: str) -> frozenset[str]:
 
 
 def _socket_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return the pose of the bit's end when it sits in the socket of a bolt, pointing down."""
-    p_WE = station.pose_of(bolt) @ np.array([0.0, 0.0, BIT_SEAT])
+    """Return the pose of the bit's end when it sits in the drive of a bolt, pointing down."""
+    seat = station.cell.product.screws[bolt].bit_seat
+    p_WE = station.pose_of(bolt) @ np.array([0.0, 0.0, seat])
     return RigidTransform(RotationMatrix.MakeXRotation(np.pi), p_WE)
 
 
