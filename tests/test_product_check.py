@@ -1,21 +1,26 @@
 """What would fail is said before anything is simulated: one line each, naming part or step."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from drawn_products import covered_block, write_meshes
+from drawn_products import bar_puzzle, bearing_block, covered_block, write_meshes
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.configuration.config import CellConfig
 from cell.products.drives import Drive
 from cell.products.joints import Rest, Screw
 from cell.products.loading import load_product
 from cell.products.product import Grasp, Part, Product
+from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from planning.product_check.check import plan_findings
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
+from planning.product_check.reach import reached_grasps
+from planning.product_draft.reach import within_reach
 
 CONFIG = CellConfig()
 
@@ -74,6 +79,20 @@ def test_torque_beyond_the_driver(product: Product) -> None:
     found = said(machine_findings(replace(product, joints=joints), CONFIG), Level.FAILS)
     assert "screw_1, screw_2: 1.2 N m, and the driver gives" in found
     assert said(machine_findings(product, CONFIG), Level.FAILS) == ""
+
+
+def test_grasps_that_no_step_can_use_are_found(product: Product) -> None:
+    cover = product.parts["cover"]
+    top = cover.grasps[0]
+    turned = top.X_PJaw @ RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0, 0, 0])
+    upside_down = replace(top, name="top_9", X_PJaw=turned)
+    wrong = changed(product, "cover", grasps=(upside_down, *cover.grasps))
+    _, todo = plan_findings(wrong, None, CONFIG)
+    reached = reached_grasps(RunningCell(wrong, CONFIG, 0).station, todo)
+    assert {grasp.name for grasp in reached["cover"]} == {g.name for g in cover.grasps}
+    kept, (guess,) = within_reach(wrong, reached)
+    assert kept.parts["cover"].grasps == cover.grasps
+    assert "left out: top_9" in str(guess)
 
 
 def with_drives(product: Product, *names: str) -> Product:
@@ -170,6 +189,17 @@ def test_a_product_without_a_tray(file: Path, tmp_path: Path) -> None:
         assert main(["check", str(bare), "--quiet"]) == 1
     finally:
         bare.unlink()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("drawn", [bearing_block, bar_puzzle])
+def test_drawn_products_are_assembled(drawn: Callable, tmp_path: Path) -> None:  # pyright: ignore
+    """A bush and a cover on it, four screws; five bars of which one bridges two others."""
+    source = write_meshes(drawn(), tmp_path / "cad")
+    out = tmp_path / "own"
+    assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet"]) == 0
+    run = ["assemble", str(out / "product.yaml"), "--out", str(tmp_path / "run"), "--quiet"]
+    assert main(run) == 0
 
 
 @pytest.mark.slow

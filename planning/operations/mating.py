@@ -189,6 +189,10 @@ def _insert(
     X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
     arm, holding = station.holder.name, lost_grasp(station)
 
+    # It slides on whatever it touches there, not only on what it comes to.
+    others = {mating.on, *station.fixed} - {mating.part}
+    pairs = frozenset(frozenset([mating.part, other]) for other in others)
+
     def guard(sensed: Sensed) -> str | None:
         force = float(np.linalg.norm(sensed.wrench[arm][3:]))
         too_much = f"insertion force {force:.1f} N" if force > TOO_MUCH else None
@@ -205,7 +209,7 @@ def _insert(
             commands={arm: impedance(config, jaw, X_JawC, target, force)},
             guard=guard,
             awake=awake,
-            mating=frozenset([frozenset([mating.part, mating.on])]),
+            mating=pairs,
             fine_log=True,
             tare=kind is MatePhase.INSERT,
         )
