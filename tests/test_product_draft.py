@@ -118,6 +118,15 @@ def test_a_screw_without_a_hole_is_said() -> None:
     assert "no threaded hole" in str(guesses[0])
 
 
+def test_a_screw_that_no_bit_fits_is_said() -> None:
+    block = box((-20, -20, -40), (20, 20, 0)) - cylinder(3.4, -20.0, 1.0, 64)
+    cover = box((-20, -20, 0), (20, 20, 5)) - cylinder(4.5, -1.0, 6.0, 64)
+    parts = meshes({"block": block, "cover": cover, "large": screw(0, 0, 5, 8, 20)})
+    screws, guesses = guess_screws({name: cylinders_of(m) for name, m in parts.items()})
+    assert screws == []
+    assert "sizes and bits are known from M2 to M6" in str(guesses[0])
+
+
 @pytest.mark.parametrize("clearance", [0.02, 0.1, 0.25])
 def test_a_fit_has_the_clearance_that_is_drawn(clearance: float) -> None:
     features = {n: cylinders_of(m) for n, m in meshes(pinned_block(clearance)).items()}

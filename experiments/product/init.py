@@ -15,6 +15,7 @@ from rich.table import Table
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.products.loading import is_product_file, load_product
+from cell.products.materials import DEFAULT_MATERIAL, DENSITIES
 from cell.products.model_files import OWN_MODELS
 from cell.products.product import Product
 from cell.products.read_options import ReadOptions
@@ -101,7 +102,13 @@ def _read(wanted: Wanted) -> Product:
         raise InputError(f"--torque must be above zero, in N m, not {wanted.torque:g}.")
     if wanted.up is not None and wanted.up not in DIRECTIONS:
         raise InputError(f"--up is one of {', '.join(DIRECTIONS)}, not '{wanted.up}'.")
-    options = ReadOptions(units=wanted.units, split=wanted.split, leave_out=wanted.leave_out)
+    # Materials, and with them masses, are guessed later: no remark on a density is due here.
+    options = ReadOptions(
+        units=wanted.units,
+        split=wanted.split,
+        leave_out=wanted.leave_out,
+        densities={"": DENSITIES[DEFAULT_MATERIAL]},
+    )
     product = load_product(wanted.source, options)
     return replace(product, up=wanted.up or product.up)
 
