@@ -58,6 +58,16 @@ def test_every_kind_of_joint_reads_in_the_order_of_the_file(read) -> None:
     assert bolt_2 == replace(bolt_1, part="pin_2")
 
 
+def test_a_bit_fits_in_as_many_ways_as_its_drive_has_sides(read) -> None:
+    entry = SCREW[:-1] + ", drive: {}, bit_seat_mm: 0.8}}"
+    for drive, ways in (("hex 3", 6), ("cross 2", 4)):
+        bolt = read(entry.replace("{}", drive).replace("}}", "}")).joints[0]
+        assert (bolt.drive.name, bolt.drive.positions) == (drive, ways)
+        assert bolt.bit_seat == pytest.approx(8e-4)
+    with pytest.raises(UnknownName, match="torx 10"):
+        read(entry.replace("{}", "torx 10").replace("}}", "}"))
+
+
 def test_fits_and_screws_are_views_of_the_joints(read) -> None:
     product = read(REST, FIT, SCREW, PRESS)
     assert product.fits == product.joints[1:2]

@@ -1,20 +1,27 @@
 """What would fail is said before anything is simulated: one line each, naming part or step."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
-from drawn_products import covered_block, write_meshes
+from drawn_products import bar_puzzle, bearing_block, covered_block, write_meshes
+from manifold3d import Manifold
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.configuration.config import CellConfig
-from cell.products.joints import Rest
+from cell.products.drives import Drive
+from cell.products.joints import Rest, Screw
 from cell.products.loading import load_product
 from cell.products.product import Grasp, Part, Product
+from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from planning.product_check.check import plan_findings
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
+from planning.product_check.reach import reached_grasps
+from planning.product_draft.reach import within_reach
 
 CONFIG = CellConfig()
 
@@ -73,6 +80,50 @@ def test_torque_beyond_the_driver(product: Product) -> None:
     found = said(machine_findings(replace(product, joints=joints), CONFIG), Level.FAILS)
     assert "screw_1, screw_2: 1.2 N m, and the driver gives" in found
     assert said(machine_findings(product, CONFIG), Level.FAILS) == ""
+
+
+def test_grasps_that_no_step_can_use_are_found(product: Product) -> None:
+    cover = product.parts["cover"]
+    top = cover.grasps[0]
+    turned = top.X_PJaw @ RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0, 0, 0])
+    upside_down = replace(top, name="top_9", X_PJaw=turned)
+    wrong = changed(product, "cover", grasps=(upside_down, *cover.grasps))
+    _, todo = plan_findings(wrong, None, CONFIG)
+    reached = reached_grasps(RunningCell(wrong, CONFIG, 0).station, todo)
+    assert {grasp.name for grasp in reached["cover"]} == {g.name for g in cover.grasps}
+    kept, (guess,) = within_reach(wrong, reached)
+    assert kept.parts["cover"].grasps == cover.grasps
+    assert "left out: top_9" in str(guess)
+
+
+def with_drives(product: Product, *names: str) -> Product:
+    """Return a product whose screws have these drives, in their order."""
+    drives = dict(zip(product.screws, map(Drive, names), strict=True))
+    joints = tuple(
+        replace(joint, drive=drives[joint.part]) if isinstance(joint, Screw) else joint
+        for joint in product.joints
+    )
+    return replace(product, joints=joints)
+
+
+def test_each_screw_is_turned_by_the_bit_of_its_head(product: Product) -> None:
+    """An M4 cap screw: its socket, 2 mm deep, is in a head of 4 mm [R] ISO 4762."""
+    for screw in product.screws.values():
+        assert screw.drive == Drive("hex 3")
+        assert screw.bit_seat == pytest.approx(2e-3, abs=1e-6)
+
+
+def test_a_drive_that_no_bit_fits(product: Product) -> None:
+    wrong = with_drives(product, "hex 3", "hex 17")
+    found = said(machine_findings(wrong, CONFIG), Level.FAILS)
+    assert "screw_2: no bit fits 'hex 17'; there are hex 1.5," in found
+
+
+def test_drives_that_need_several_bits(product: Product) -> None:
+    several = with_drives(product, "hex 3", "cross 2")
+    assert "hex 3 for screw_1; cross 2 for screw_2" in said(
+        machine_findings(several, CONFIG), Level.DOUBTFUL
+    )
 
 
 def test_a_part_too_heavy_for_the_arm(product: Product) -> None:
@@ -139,6 +190,24 @@ def test_a_product_without_a_tray(file: Path, tmp_path: Path) -> None:
         assert main(["check", str(bare), "--quiet"]) == 1
     finally:
         bare.unlink()
+
+
+def own_product(drawn: Mapping[str, Manifold], folder: Path) -> str:
+    """Return the product file that is drafted from what is drawn."""
+    source, out = write_meshes(drawn, folder / "cad"), folder / "own"
+    assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet"]) == 0
+    return str(out / "product.yaml")
+
+
+@pytest.mark.slow
+def test_a_bush_a_cover_over_it_and_four_screws_pass(tmp_path: Path) -> None:
+    assert main(["check", own_product(bearing_block(), tmp_path), "--quiet"]) == 0
+
+
+@pytest.mark.slow
+def test_five_bars_are_assembled_where_one_bridges_two(tmp_path: Path) -> None:
+    file = own_product(bar_puzzle(), tmp_path)
+    assert main(["assemble", file, "--out", str(tmp_path / "run"), "--quiet"]) == 0
 
 
 @pytest.mark.slow

@@ -16,8 +16,9 @@ from cell.machines.drive import JointDrive
 from cell.machines.driver import Driver, DriverDrive
 from cell.monitor import Monitor, StepCounter
 from cell.paths import model_url, new_parser
+from cell.products.joints import BIT_SEAT
 from cell.products.product import Product
-from cell.workpieces.thread import BIT_SEAT, add_thread, set_head_friction
+from cell.workpieces.thread import add_thread, set_head_friction
 from cell.workpieces.threads import Threads
 
 BOLT = "bolt_1"

@@ -13,11 +13,16 @@ from typing import Any, ClassVar, Protocol
 import numpy as np
 
 from cell.errors import InputError
+from cell.products.drives import Drive
 from cell.products.fields import Fields, mapping_at, one_of
 
 FRICTION_RADIUS_PER_DIAMETER = 0.7
 """[D] (d_w + d_h) / 4 of the head's bearing face (ISO 4762) and the clearance hole (ISO 273,
 medium), over the nominal diameter: 0.71 for M3, 0.67 for M8."""
+
+
+BIT_SEAT = 1.2e-3
+"""Where nothing is said: of M3 in hex 2.5, 1.3 to 2 mm deep in a head of 3 mm [R] ISO 4762 [m]."""
 
 
 class PartNames(Protocol):
@@ -107,6 +112,8 @@ class Screw:
         nut_factor: K in T = K d F, with the clamp force F.
         friction_radius: Mean distance from the axis of the contact under the head [m]; None for
             that of a standard head and hole.
+        drive: What turns it.
+        bit_seat: Height of the bit's end above the underside of the head, when it is in [m].
     """
 
     keys: ClassVar[tuple[str, ...]] = (
@@ -120,6 +127,8 @@ class Screw:
         "torque_Nm",
         "nut_factor",
         "friction_radius_mm",
+        "drive",
+        "bit_seat_mm",
     )
 
     part: str
@@ -132,6 +141,8 @@ class Screw:
     torque: float
     nut_factor: float
     friction_radius: float | None = None
+    drive: Drive = Drive("hex 2.5")
+    bit_seat: float = BIT_SEAT
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -157,11 +168,16 @@ class Screw:
                     if "friction_radius_mm" in entry
                     else None
                 ),
+                drive=Drive(entry.text("drive") if "drive" in entry else "hex 2.5"),
+                bit_seat=(
+                    entry.positive("bit_seat_mm") * 1e-3 if "bit_seat_mm" in entry else BIT_SEAT
+                ),
             )
             for bolt in product.members(entry.text("part"))
         ]
         for screw in screws:
             head_friction(screw)  # Refuses a nut factor that no friction gives.
+            _ = screw.drive.positions  # Refuses a drive that no bit fits.
         return screws
 
 

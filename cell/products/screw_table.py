@@ -1,12 +1,17 @@
 """Metric screws from M2 to M6: thread, heads and drives, clearance holes, tightening torque.
 
-Lengths in millimetres. [R] ISO 261 (coarse pitch), ISO 4762 (hexagon socket cap heads), ISO 7045
-(pan heads with cross recess), ISO 273 medium (clearance holes), ISO 2306 (tap drills), ISO 898-1
-(stress areas and strength classes).
+Lengths in millimetres. [R] from tables that suppliers and engineering sites print of the standards,
+not from the standards themselves: ISO 4762 (hexagon socket cap heads with coarse pitch, bearing
+face and depth of the socket; geartoolkit.com), ISO 7045, recess H (pan heads; fullerfasteners.com,
+other sites print DIN 7985 under that number), ISO 273 medium (clearance holes;
+engineeringhardware.com), ISO 898-1 and ISO 3506-1 (strength classes; roymech.co.uk). Stress areas
+by the formula of ISO 898-1 agree with its table from M3 on (usefastener.com), tap drills of one
+pitch less than the diameter with drill charts (nightshade.net).
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 
@@ -43,8 +48,6 @@ class ScrewSize:
         diameter: Nominal, d [mm].
         pitch: [mm].
         clearance_hole: Its diameter [mm].
-        tap_drill: Its diameter [mm].
-        stress_area: [mm2].
         heads: The kinds that are known.
     """
 
@@ -52,9 +55,17 @@ class ScrewSize:
     diameter: float
     pitch: float
     clearance_hole: float
-    tap_drill: float
-    stress_area: float
     heads: tuple[Head, ...]
+
+    @property
+    def tap_drill(self) -> float:
+        """Diameter of the hole that a thread is cut into [mm]."""
+        return self.diameter - self.pitch
+
+    @property
+    def stress_area(self) -> float:
+        """Nominal stress area, pi / 4 ((d_2 + d_3) / 2)^2 [mm2]."""
+        return math.pi / 4.0 * (self.diameter - 0.9382 * self.pitch) ** 2
 
     def preload_torque(self, strength: str, nut_factor: float) -> float:
         """Return the tightening torque for 70 % of the yield strength [N m].
@@ -85,22 +96,22 @@ NUT_FACTOR = 0.202
 """[D] K in T = K d F for friction of 0.14 in the thread and under the head, M3."""
 
 _SIZES = (
-    ("M2", 2.0, 0.4, 2.4, 1.6, 2.07, (1.5, 3.8, 2.0, 3.48, 1.0), (0, 4.0, 1.6, 3.6, 0.9)),
-    ("M2.5", 2.5, 0.45, 2.9, 2.05, 3.39, (2.0, 4.5, 2.5, 4.18, 1.1), (1, 5.0, 2.1, 4.5, 1.0)),
-    ("M3", 3.0, 0.5, 3.4, 2.5, 5.03, (2.5, 5.5, 3.0, 5.07, 1.3), (1, 5.6, 2.4, 5.1, 1.4)),
-    ("M4", 4.0, 0.7, 4.5, 3.3, 8.78, (3.0, 7.0, 4.0, 6.53, 2.0), (2, 8.0, 3.1, 7.2, 1.9)),
-    ("M5", 5.0, 0.8, 5.5, 4.2, 14.2, (4.0, 8.5, 5.0, 8.03, 2.5), (2, 9.5, 3.7, 8.6, 2.4)),
-    ("M6", 6.0, 1.0, 6.6, 5.0, 20.1, (5.0, 10.0, 6.0, 9.38, 3.0), (3, 12.0, 4.6, 11.0, 3.1)),
+    ("M2", 2.0, 0.4, 2.4, (1.5, 3.8, 2.0, 3.48, 1.0), (0, 4.0, 1.6, 3.6, 0.9)),
+    ("M2.5", 2.5, 0.45, 2.9, (2.0, 4.5, 2.5, 4.18, 1.1), (1, 5.0, 2.1, 4.5, 1.15)),
+    ("M3", 3.0, 0.5, 3.4, (2.5, 5.5, 3.0, 5.07, 1.3), (1, 5.6, 2.4, 5.1, 1.4)),
+    ("M4", 4.0, 0.7, 4.5, (3.0, 7.0, 4.0, 6.53, 2.0), (2, 8.0, 3.1, 7.2, 1.9)),
+    ("M5", 5.0, 0.8, 5.5, (4.0, 8.5, 5.0, 8.03, 2.5), (2, 9.5, 3.7, 8.6, 2.4)),
+    ("M6", 6.0, 1.0, 6.6, (5.0, 10.0, 6.0, 9.38, 3.0), (3, 12.0, 4.6, 11.0, 3.1)),
 )
-"""Name, d, P, clearance hole, tap drill, stress area; socket cap: flats, diameter, height, bearing,
+"""Name, d, P, clearance hole; socket cap: flats, diameter, height, bearing,
 depth of the drive; pan: recess, diameter, height, bearing [D: 0.9 of the diameter], depth."""
 
 SIZES: tuple[ScrewSize, ...] = tuple(
     ScrewSize(
-        *row[:6],
+        *row[:4],
         (
-            Head("socket cap", f"hex {row[6][0]:g}", *row[6][1:]),
-            Head("pan", f"cross {row[7][0]}", *row[7][1:]),
+            Head("socket cap", f"hex {row[4][0]:g}", *row[4][1:]),
+            Head("pan", f"cross {row[5][0]}", *row[5][1:]),
         ),
     )
     for row in _SIZES

@@ -1,6 +1,6 @@
 """Screw threads: a bolt that is driven into a tapped hole.
 
-What is modelled instead of simulated: the flanks of the thread and the hex of the bit. A *follower*
+What is modelled instead of simulated: the flanks of the thread and those of the bit. A *follower*
 body rides on a ``ScrewJoint`` of the threaded part (axis along the hole, lead = pitch). It is
 locked until the thread *catches*: then three ball constraints tie the bolt to it, and the bolt
 advances one pitch per turn and carries axial force through the joint, whose reaction is the clamp
@@ -54,10 +54,6 @@ FOLLOWER_INERTIA = 1e-6
 # Inertia added to an engaged bolt: below it 0.6 N m is lost to constraint regularisation [M].
 ENGAGED_MASS_FACTOR = 8.0
 ENGAGED_INERTIA_FACTOR = 100.0
-# A hex bit fits in six ways.
-HEX_POSITIONS = 6
-# Bit end above the underside of the head: M3 hex sockets are 1.3 to 2 mm deep in a 3 mm head [R].
-BIT_SEAT = 1.2e-3
 
 
 @dataclass(frozen=True)
@@ -123,7 +119,7 @@ class ThreadState(Enum):
 
 
 STATES = tuple(ThreadState)
-NO_BIT = -1  # Hex position of a bit that is not in the socket.
+NO_BIT = -1  # Position of a bit that is not in the drive.
 
 
 @dataclass(frozen=True)
@@ -132,7 +128,7 @@ class Engagement:
 
     Attributes:
         state: Of the thread.
-        bit_position: In which of its six ways the bit is in the socket, or `NO_BIT`.
+        bit_position: In which of its ways the bit is in the drive, or `NO_BIT`.
         caught_angle: Angle of the follower when the thread caught [rad].
     """
 
@@ -182,11 +178,11 @@ class Thread:
         return -float(forces[int(self.joint.index())].translational()[2])
 
     def bit_misfit(self, context: Context) -> tuple[Misfit, int]:
-        """Return the error between bit and socket, for the nearest of the six hex positions."""
+        """Return the error between bit and drive, for the nearest way in which it fits."""
         X_FE = self.bit_frame.CalcPose(context, self.bolt.body_frame())
         fits = [
-            Misfit.between(_X_FE_seated(position).inverse() @ X_FE)
-            for position in range(HEX_POSITIONS)
+            Misfit.between(_X_FE_seated(self.screw, position).inverse() @ X_FE)
+            for position in range(self.screw.drive.positions)
         ]
         position = int(np.argmin([abs(fit.angle) for fit in fits]))
         return fits[position], position
@@ -213,7 +209,7 @@ class Thread:
         (self.joint.Unlock if turns else self.joint.Lock)(context)
 
     def set_bit(self, root: Context, position: int) -> None:
-        """Tie the bit in one of its hex positions; `NO_BIT` opens all ties."""
+        """Tie the bit in one of the ways it fits; `NO_BIT` opens all ties."""
         context = self.plant.GetMyMutableContextFromRoot(root)
         for k, tie in enumerate(self.bit_ties):
             for constraint in tie:
@@ -247,10 +243,10 @@ class Thread:
         filters.Apply(declare(GeometrySet(bolt), GeometrySet(parent)))
 
 
-def _X_FE_seated(position: int) -> RigidTransform:
-    """Pose of the seated bit end in the bolt frame, for one of the six hex positions."""
-    spin = RotationMatrix.MakeZRotation(position * 2 * np.pi / HEX_POSITIONS)
-    return RigidTransform(RotationMatrix.MakeXRotation(np.pi) @ spin, [0.0, 0.0, BIT_SEAT])
+def _X_FE_seated(screw: Screw, position: int) -> RigidTransform:
+    """Pose of the seated bit end in the bolt frame, for one of the ways in which it fits."""
+    spin = RotationMatrix.MakeZRotation(position * 2 * np.pi / screw.drive.positions)
+    return RigidTransform(RotationMatrix.MakeXRotation(np.pi) @ spin, [0.0, 0.0, screw.bit_seat])
 
 
 def _tie_points(z: float) -> list[np.ndarray]:
@@ -332,13 +328,15 @@ def add_thread(
         tuple(
             plant.AddBallConstraint(
                 bit_frame.body(),
-                bit_frame.GetFixedPoseInBodyFrame() @ _X_FE_seated(position).inverse() @ point,
+                bit_frame.GetFixedPoseInBodyFrame()
+                @ _X_FE_seated(screw, position).inverse()
+                @ point,
                 bolt,
                 point,
             )
-            for point in _tie_points(BIT_SEAT)
+            for point in _tie_points(screw.bit_seat)
         )
-        for position in range(HEX_POSITIONS)
+        for position in range(screw.drive.positions)
     )
     return Thread(
         screw, plant, scene_graph, bolt, follower, joint, H, bit_frame, thread_tie, bit_ties

@@ -15,13 +15,18 @@ from rich.table import Table
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.products.loading import is_product_file, load_product
+from cell.products.materials import DEFAULT_MATERIAL, DENSITIES
 from cell.products.model_files import OWN_MODELS
 from cell.products.product import Product
 from cell.products.read_options import ReadOptions
+from experiments.assembly.prepare import RunningCell
 from experiments.reporting.output import output_folder
 from planning.feasibility.directions import DIRECTIONS
+from planning.product_check.check import plan_findings
+from planning.product_check.reach import reached_grasps
 from planning.product_draft.draft import Draft, DraftOptions, draft_product
 from planning.product_draft.product_text import product_text
+from planning.product_draft.reach import within_reach
 
 PRODUCT_FILE = "product.yaml"
 
@@ -60,6 +65,8 @@ def run_init(wanted: Wanted, out: Path, config: CellConfig, *, quiet: bool) -> i
         own = Path(draft_folder)
         draft = draft_product(product, own, options)
         (own / PRODUCT_FILE).write_text(product_text(draft))
+        draft = _within_reach(draft, load_product(own / PRODUCT_FILE), config)
+        (own / PRODUCT_FILE).write_text(product_text(draft))
         load_product(own / PRODUCT_FILE)  # What cannot be read back is not handed over.
         for name in (OWN_MODELS, PRODUCT_FILE):
             shutil.move(own / name, folder / name)
@@ -72,6 +79,22 @@ def run_init(wanted: Wanted, out: Path, config: CellConfig, *, quiet: bool) -> i
     return 0
 
 
+def _within_reach(draft: Draft, product: Product, config: CellConfig) -> Draft:
+    """Return a draft without the grasps that no step can use; all of them if there are no steps.
+
+    Args:
+        draft: What was drafted.
+        product: The same as a run reads it, with its models.
+        config: The cell.
+    """
+    _, todo = plan_findings(product, None, config)
+    if not todo:
+        return draft
+    reached = reached_grasps(RunningCell(product, config, seed=0).station, todo)
+    kept, guesses = within_reach(draft.product, reached)
+    return replace(draft, product=kept, guesses=(*draft.guesses, *guesses))
+
+
 def _read(wanted: Wanted) -> Product:
     if is_product_file(str(wanted.source)):
         raise InputError(f"'{wanted.source}' is a product already; init takes CAD.")
@@ -79,7 +102,13 @@ def _read(wanted: Wanted) -> Product:
         raise InputError(f"--torque must be above zero, in N m, not {wanted.torque:g}.")
     if wanted.up is not None and wanted.up not in DIRECTIONS:
         raise InputError(f"--up is one of {', '.join(DIRECTIONS)}, not '{wanted.up}'.")
-    options = ReadOptions(units=wanted.units, split=wanted.split, leave_out=wanted.leave_out)
+    # Materials, and with them masses, are guessed later: no remark on a density is due here.
+    options = ReadOptions(
+        units=wanted.units,
+        split=wanted.split,
+        leave_out=wanted.leave_out,
+        densities={"": DENSITIES[DEFAULT_MATERIAL]},
+    )
     product = load_product(wanted.source, options)
     return replace(product, up=wanted.up or product.up)
 

@@ -101,7 +101,8 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     """
     arm, part = station.holder, mating.part
     held = frozenset([part, *riders])
-    both = held | {mating.on}
+    # What bears the part that it comes to has to be there, too: nothing stands on what sleeps.
+    both = held | {mating.on, *station.fixed}
     yield from look(station, MatePhase.LOOK, part)
     X_WGoal = goal_pose(station, mating)
     reach = first(useful_grasps(station, mating, X_WGoal), part, station)
@@ -192,6 +193,9 @@ def _insert(
     X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
     arm = station.holder.name
     guard = FirstOf((lost_grasp(station), TooMuchForce(arm, TOO_MUCH, "insertion force")))
+    # It slides on whatever it touches there, not only on what it comes to.
+    others = {mating.on, *station.fixed} - {mating.part}
+    pairs = frozenset(frozenset([mating.part, other]) for other in others)
 
     def soft(
         kind: MatePhase, force: float, target: Target, until: Condition, timeout: float
@@ -204,7 +208,7 @@ def _insert(
             commands={arm: impedance(config, jaw, X_JawC, target, force)},
             guard=guard,
             awake=awake,
-            mating=frozenset([frozenset([mating.part, mating.on])]),
+            mating=pairs,
             fine_log=True,
             tare=kind is MatePhase.INSERT,
         )

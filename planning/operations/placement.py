@@ -37,10 +37,10 @@ def anywhere(X_WP: RigidTransform) -> bool:
 
 
 def enters_from_above(product: Product, fit: Fit) -> bool:
-    """Return whether a shaft comes down into its hole: its part is above the mouth, mostly."""
-    up, shaft = unit_vector(product.up), product.parts[fit.shaft]
-    p_AoG = shaft.X_AP @ np.asarray(shaft.mesh.center_mass, float)
-    return bool(up @ (p_AoG - fit.p_AoF) > 0.0)
+    """Return whether a shaft comes down into its hole: what has the hole is below its mouth."""
+    up, hole = unit_vector(product.up), product.parts[fit.hole]
+    p_AoG = hole.X_AP @ np.asarray(hole.mesh.center_mass, float)
+    return bool(up @ (p_AoG - fit.p_AoF) < 0.0)
 
 
 def brought_to(product: Product, part: str) -> tuple[str, ...]:

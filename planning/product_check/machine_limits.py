@@ -9,6 +9,7 @@ from cell.errors import UnknownName
 from cell.machines.arms import arm_model
 from cell.machines.driver import largest_torque
 from cell.machines.grippers import GRIPPER_MODELS, GripperModel
+from cell.products.drives import BITS
 from cell.products.product import Part, Product
 from planning.product_check.finding import Finding, doubtful, fails, good
 
@@ -23,6 +24,7 @@ def machine_findings(product: Product, config: CellConfig) -> Iterator[Finding]:
         yield from _mass(part, gripper, payload)
         yield from _grasps(part, gripper)
     yield from _screws(product, config)
+    yield from _bits(product)
 
 
 def _holder(config: CellConfig) -> tuple[GripperModel, float]:
@@ -90,3 +92,15 @@ def _screws(product: Product, config: CellConfig) -> Iterator[Finding]:
             )
         else:
             yield good(subject, f"{torque:.3g} N m of the {most:.3g} that the driver gives")
+
+
+def _bits(product: Product) -> Iterator[Finding]:
+    """Yield findings on what turns the screws; each drive needs its own bit."""
+    turned: dict[str, list[str]] = {}
+    for name, screw in product.screws.items():
+        turned.setdefault(screw.drive.name, []).append(name)
+        if not screw.drive.has_bit:
+            yield fails(name, f"no bit fits '{screw.drive.name}'; there are {', '.join(BITS)}")
+    if len(turned) > 1:
+        bits = "; ".join(f"{drive} for {', '.join(names)}" for drive, names in turned.items())
+        yield doubtful("driver", f"it changes no bits, and a run takes them as changed: {bits}")

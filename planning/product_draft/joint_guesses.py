@@ -14,7 +14,15 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.cad.round_features import Cylinder
-from cell.products.screw_table import HEAD_MISFIT, Head, ScrewSize, head_of, size_of
+from cell.products.screw_table import (
+    HEAD_MISFIT,
+    SIZE_MISFIT,
+    SIZES,
+    Head,
+    ScrewSize,
+    head_of,
+    size_of,
+)
 from planning.product_draft.guess import Guess
 
 Features = Mapping[str, Sequence[Cylinder]]  # By name of the part.
@@ -22,11 +30,13 @@ Features = Mapping[str, Sequence[Cylinder]]  # By name of the part.
 HEAD_WIDER = 1.3  # [A] Than the shank: the smallest of any standard is 1.5.
 COAXIAL = 0.1  # [A] Of the radius: parts are drawn where they belong.
 THREAD = 1.02  # [A] Hole over shank up to which it is threaded: clearance holes begin at 1.06.
-TAPPED = 0.75  # [R] ISO 2306: tap drills are 0.78 (M2) to 0.84 (M6) of the diameter.
+TAPPED = 0.75  # [D] Of the diameter; tap drills, d - P, are 0.8 (M2) to 0.84 (M5) of it.
 CLEARANCE_HOLE = 1.5  # [A] Hole over shank from which nothing guides it.
 LOOSEST_FIT, LOOSEST = 0.12, 3e-4  # [M] Clearance of a fit: share of the radius, and [m] on top.
 LINE_TO_LINE = 5e-6  # [A] Clearance below which a fit is drawn without one [m].
-SLIDING = 2e-5  # [R] ISO 286: H7/g6 has 6 to 41 um between 10 and 18 mm, on the diameter [m].
+# [A] Radially, where none is drawn: near the wide end of H7/g6, 5 to 28 um in diameter at 10 mm and
+# 7 to 41 um at 25 mm [R machinecalcs.com, ISO 286 fit table] [m].
+SLIDING = 2e-5
 TIGHTEST_PRESS = 0.02  # [A] Interference of a press fit, of the radius.
 
 
@@ -91,11 +101,16 @@ def guess_screws(features: Features) -> tuple[list[ScrewGuess], list[Guess]]:
         if shape is None:
             continue
         shank, head, size = shape
-        kind, misfit = head_of(size, 2e3 * head.radius, 1e3 * head.length)
         holes = _holes_around(part, shank, features)
         threaded = [h for h in holes if TAPPED <= h.ratio <= THREAD]
         passed = [h for h in holes if THREAD < h.ratio <= CLEARANCE_HOLE]
         looks = f"shank of {2e3 * shank.radius:.3g} mm, head of {2e3 * head.radius:.3g} mm"
+        if size is None:
+            if threaded and passed:
+                known = f"sizes and bits are known from {SIZES[0].name} to {SIZES[-1].name}"
+                guesses.append(Guess(part, f"not taken for a screw: {known}", looks, 0.7))
+            continue
+        kind, misfit = head_of(size, 2e3 * head.radius, 1e3 * head.length)
         if misfit > 2.0 * HEAD_MISFIT:
             continue
         if not threaded or not passed:
@@ -199,17 +214,21 @@ def _holes_around(part: str, shaft: Cylinder, features: Features) -> list[_Aroun
     return found
 
 
-def _screw_shape(cylinders: Sequence[Cylinder]) -> tuple[Cylinder, Cylinder, ScrewSize] | None:
-    """Return shank and head of a part, the head at the upper end of their axis, and the size."""
+def _screw_shape(
+    cylinders: Sequence[Cylinder],
+) -> tuple[Cylinder, Cylinder, ScrewSize | None] | None:
+    """Return shank and head of a part, the head at the upper end of their axis, and the size.
+
+    The size is None if it is none of the table; one of the table is looked for first.
+    """
     bosses = [cylinder for cylinder in cylinders if not cylinder.hole]
+    unknown = None
     for head in sorted(bosses, key=lambda boss: -boss.radius):
         for shank in bosses:
-            size = size_of(2e3 * shank.radius)
             if (
-                size is None
-                or head.radius < HEAD_WIDER * shank.radius
+                head.radius < HEAD_WIDER * shank.radius
                 or not shank.coaxial(head, COAXIAL * shank.radius)
-                or shank.length < 1e-3 * size.diameter
+                or shank.length < 2.0 * shank.radius * (1.0 - SIZE_MISFIT)
             ):
                 continue
             upright = (head, shank)
@@ -217,5 +236,8 @@ def _screw_shape(cylinders: Sequence[Cylinder]) -> tuple[Cylinder, Cylinder, Scr
                 upright = (head.reversed(), shank.reversed())
             head_up, shank_up = upright
             if abs(head_up.flare_low[1] - shank_up.flare_high[1]) < 0.3 * shank.radius:
-                return shank_up, head_up, size
-    return None
+                size = size_of(2e3 * shank.radius)
+                if size is not None:
+                    return shank_up, head_up, size
+                unknown = unknown or (shank_up, head_up, None)
+    return unknown

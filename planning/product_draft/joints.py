@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 from cell.cad.contact_model import ContactModel
 from cell.errors import RunFailure
+from cell.products.drives import Drive
 from cell.products.joints import Fit, Joint, Press, Rest, Screw
 from cell.products.screw_table import NUT_FACTOR
 from planning.assembly_plan.planner import FixingPlan
@@ -82,6 +83,8 @@ class Joining:
             torque=torque,
             nut_factor=NUT_FACTOR,
             friction_radius=radius,
+            drive=Drive(screw.head.drive),
+            bit_seat=screw.head_size[1] - 1e-3 * screw.head.engagement,
         )
 
     def _fit(self, fit: FitGuess, later: str) -> Joint:

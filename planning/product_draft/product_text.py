@@ -103,6 +103,8 @@ def _joint(joint: Joint, product: Product) -> Iterator[str]:
         yield f"    thread_depth_mm: {1e3 * joint.thread_depth:.5g}  # Engaged when seated."
         yield f"    torque_Nm: {joint.torque:.4g}"
         yield f"    nut_factor: {joint.nut_factor:g}  # K in T = K d F."
+        yield f'    drive: "{joint.drive.name}"  # The bit that turns it.'
+        yield f"    bit_seat_mm: {1e3 * joint.bit_seat:.4g}  # Its end above the head's underside."
         assert joint.friction_radius is not None
         yield f"    friction_radius_mm: {1e3 * joint.friction_radius:.6g}  # Of the contact model."
     elif isinstance(joint, Fit | Press):

@@ -53,7 +53,7 @@ IIWA14 = ArmModel(
         )
     ),
     base_mass=5.0,
-    payload=14.0,  # [R] Data sheet.
+    payload=14.0,  # [R] IFL-CAMP/iiwa_stack, description of the repository.
     flange_z=0.045,
     # As stiff as the six-axis arms [A]; about critical with the arm stretched [D].
     stiffness=(2e4, 2e4, 2e4, 2e4, 5e3, 5e3, 5e3),

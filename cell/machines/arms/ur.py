@@ -212,7 +212,7 @@ def _ur_arm(
         name=name,
         links=links,
         base_mass=base_mass,
-        payload=payload,  # [R] Data sheets of the e-series.
+        payload=payload,
         stiffness=(2e4, 2e4, 2e4, 5e3, 5e3, 5e3),  # Stable at any gain [A].
         damping=damping,
         # Forearm 10 deg up, tool down; the driver's arm waits to the side of the jig [A].
@@ -241,7 +241,7 @@ UR3E = _ur_arm(
     speed_deg=(180, 180, 180, 360, 360, 360),
     effort=(56.0, 56.0, 28.0, 12.0, 12.0, 12.0),
     damping=(250.0, 250.0, 150.0, 50.0, 50.0, 50.0),
-    payload=3.0,
+    payload=3.0,  # [R] As resellers list it, not from the maker.
     base_mass=2.0,
 )
 # The inertia of upper arm and forearm is published about an axis along x; here in link axes [R].
@@ -260,7 +260,7 @@ UR5E = _ur_arm(
     speed_deg=(180, 180, 180, 180, 180, 180),
     effort=(150.0, 150.0, 150.0, 28.0, 28.0, 28.0),
     damping=(500.0, 500.0, 300.0, 60.0, 60.0, 60.0),
-    payload=5.0,
+    payload=5.0,  # [A] The class that its name says.
 )
 UR10E = _ur_arm(
     "ur10e",
@@ -277,5 +277,5 @@ UR10E = _ur_arm(
     speed_deg=(120, 120, 180, 180, 180, 180),
     effort=(330.0, 330.0, 150.0, 56.0, 56.0, 56.0),
     damping=(900.0, 900.0, 500.0, 60.0, 60.0, 60.0),
-    payload=12.5,
+    payload=12.5,  # [R] User manual; 10 kg on older arms, see the label.
 )

@@ -121,9 +121,8 @@ def place_bolt(station: Station, bolt: str) -> Iterator[Phase]:
     yield Phase(
         BoltPhase.HOVER, steady_wrist(arm.name), 1.0, subject=bolt, guard=holding, awake=held
     )
-    # The parts on the fixture that a bolt at its hole can touch.
-    screw = station.cell.product.screws[bolt]
-    awake = held | {screw.into, screw.clamps} & frozenset(station.fixed)
+    # What a bolt at its hole can touch, and what bears that.
+    awake = held | frozenset(station.fixed)
     yield from look(station, BoltPhase.LOOK_IN, bolt, [bolt], awake=awake, guard=holding)
     under = at(raised(X_WStand, -2e-4))
     down = station.line(arm, jaw, under, speed=SLOW, felt=TOUCH_FORCE)

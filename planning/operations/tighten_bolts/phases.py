@@ -27,7 +27,6 @@ from cell.simulation.phase import (
     motion_finished,
 )
 from cell.simulation.vocabulary import in_programs
-from cell.workpieces.thread import BIT_SEAT
 from planning.motion.paths import NoPath
 from planning.motion.timing import JointMotion
 from planning.operations.counter_hold import Coming, from_the_side, hold, park
@@ -176,15 +175,15 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
 def foresee(station: Station, step: Step) -> tuple[str, ...]:
     """See whether the driver reaches every bolt, beside the hand that holds against it."""
     clamped = station.cell.product.screws[step.parts[0]].clamps
+    holds = station.config.driver.counter_hold
+    if holds and any(_leaves_room(station, step.parts, r) for r in from_the_side(station, clamped)):
+        return ()
     away = {station.holder.name: station.holder.home}
     for bolt in step.parts:
         if not ways_above(station, bolt, away):
             _above(station, bolt, away)  # Raises what is said of it.
-    if not station.config.driver.counter_hold:
+    if not holds:
         return ()
-    for reach in from_the_side(station, clamped):
-        if _leaves_room(station, step.parts, reach):
-            return ()
     alone = "leaves room for the driver: the jig alone bears the torque"
     return (f"no grasp of '{clamped}' from the side {alone}",)
 
@@ -291,8 +290,9 @@ def _awake(station: Station, *bolts: str) -> frozenset[str]:
 
 
 def _socket_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return the pose of the bit's end when it sits in the socket of a bolt, pointing down."""
-    p_WE = station.pose_of(bolt) @ np.array([0.0, 0.0, BIT_SEAT])
+    """Return the pose of the bit's end when it sits in the drive of a bolt, pointing down."""
+    seat = station.cell.product.screws[bolt].bit_seat
+    p_WE = station.pose_of(bolt) @ np.array([0.0, 0.0, seat])
     return RigidTransform(RotationMatrix.MakeXRotation(np.pi), p_WE)
 
 
