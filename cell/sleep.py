@@ -111,7 +111,10 @@ class Sleep(LeafSystem):
         """Let a body move again, from rest; arguments as of `put_to_sleep`."""
         context = self._plant.GetMyMutableContextFromRoot(root)
         if body.is_locked(context):
-            self._changed(root).loads.pop(full_name(body), None)
+            memory = self._changed(root)
+            loads = memory.loads.pop(full_name(body), [])
+            if root.get_time() == memory.restored_at:  # It may fall asleep again before any step.
+                memory.latest[full_name(body)] = loads
             self._set_contact(root, body, apart_from, active=True)
             self._joints[int(body.index())].Unlock(context)
             if self._links is not None:

@@ -74,3 +74,14 @@ def test_sleeper_neither_moves_nor_touches(cell: Cell) -> None:
     np.testing.assert_array_equal(cell.parts["motor"].X_WP(context).GetAsMatrix4(), before)
     results = cell.plant.get_contact_results_output_port().Eval(context)
     assert results.num_hydroelastic_contacts() == 0
+
+
+def test_body_woken_and_put_to_sleep_at_once_after_a_restore_keeps_its_load(cell: Cell) -> None:
+    """As at a change of the time step: there is no contact to read before the first step."""
+    player = Player(cell, PRESSED | {210: fix, 500: sleep}).play(505)
+    root, awake = player.root, plate(cell, player)
+    saved = cell.sleeper.save(root, [cell.parts["motor"].body])
+    cell.sleeper.restore(root, saved, root.get_time())
+    wake(cell, root)
+    sleep(cell, root)
+    np.testing.assert_allclose(plate(cell, player.play(5)), awake, atol=SAME)

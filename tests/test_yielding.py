@@ -108,9 +108,9 @@ def test_plastic_return_never_folds_the_mesh_over() -> None:
 
 @pytest.fixture(scope="module")
 def weak_wall() -> tuple[float, float]:
-    """Return the lateral capacity of a vented cylinder, at full strength and at a tenth [N]."""
+    """Return the lateral capacity of a vented cylinder, at full strength and at 2 % of it [N]."""
     forces = []
-    for strength in (1.0, 0.1):
+    for strength in (1.0, 0.02):
         params = parameters()
         jammed = replace(params.jammed, strength=strength)
         rig = ElementRig(replace(params, jammed=jammed), Prism(facets=12))
@@ -124,6 +124,6 @@ def weak_wall() -> tuple[float, float]:
 def test_lateral_capacity_falls_with_the_strength_of_the_walls(
     weak_wall: tuple[float, float],
 ) -> None:
-    """In the plant: at a tenth of the strength it is much smaller; the weight is left."""
+    """In the plant: at 2 % of the strength it is much smaller; the weight is left."""
     strong, weak = weak_wall
     assert 0.5 < weak < 0.8 * strong
