@@ -43,7 +43,7 @@ def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture)
         (["place", "--set", "jig.bag.cap_height=0.2"], "cap_height"),
         (["place", "--set", "jig.bag.cell=0"], "'jig.bag.cell' must be >= 0.0002"),
         (["place", "--set", "jig.vacuum.jam_fraction=1"], "jam_fraction"),
-        (["place", "--fixture", "vise"], "No fixture 'vise'. Known: flat_plate, soft_jig."),
+        (["place", "--fixture", "vise"], "No fixture 'vise'. Known: flat_plate, rigid_jig,"),
         (["push", "--hand", "foot"], "robot"),
         (["regress", "--suite", "huge"], "huge"),
     ],

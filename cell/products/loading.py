@@ -93,11 +93,10 @@ def require_product_file(name_or_path: str | Path) -> None:
         return  # What does not exist is named when it is read.
     if not path.is_dir() and path.suffix.lower() not in CAD_SUFFIXES:
         raise _unsupported(path)
-    plan = f"soft-jig plan {path}" + (" --units mm" if _needs_unit(path) else "")
+    unit = " with --units mm" if _needs_unit(path) else ""
     raise InputError(
-        f"'{path}' can be planned, but not assembled in the twin: {plan} plans it; "
-        "to assemble takes a product file (.yaml) in which every part has a 'model' (contact "
-        f"geometry) and a 'tray_pose', such as models/products/{product_names()[0]}.yaml."
+        f"'{path}' can be planned, but not assembled: soft-jig init{unit} drafts a product file "
+        "(.yaml) of it, with models and tray, that can."
     )
 
 

@@ -52,9 +52,9 @@ def _lines(draft: Draft) -> Iterator[str]:
 
 
 def _part(part: Part, screw: bool) -> Iterator[str]:
-    assert part.X_TrayP is not None
+    assert part.X_TrayP is not None and part.model is not None
     yield f"  {_quoted(part.name)}:"
-    yield f"    model: {part.model}  # {1e3 * part.mass:.4g} g."
+    yield f"    model: {_quoted(part.model)}  # {1e3 * part.mass:.4g} g."
     if not part.X_AP.IsNearlyIdentity(1e-12):
         yield f"    assembled_pose: {_pose(part.X_AP)}  # Of the part's frame in the CAD frame."
     yield f"    tray_pose: {_pose(part.X_TrayP)}"
