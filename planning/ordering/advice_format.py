@@ -35,7 +35,12 @@ def advice_text(advice: OrderAdvice) -> str:
         lines.insert(0, f"No order of single items is feasible: {listed} lock each other.")
     lines.append(f"Best orders ({claim}): {OBJECTIVE}.")
     for number, ranked in enumerate(advice.ranked, start=1):
-        unstable = f", {ranked.unstable_stages} unstable stages" if ranked.unstable_stages else ""
+        stages = (
+            "1 unstable stage"
+            if ranked.unstable_stages == 1
+            else (f"{ranked.unstable_stages} unstable stages")
+        )
+        unstable = f", {stages}" if ranked.unstable_stages else ""
         refixings = "1 re-fixing" if ranked.refixings == 1 else f"{ranked.refixings} re-fixings"
         lines.append(
             f"  {number}. {','.join(ranked.order)}: {refixings}{unstable}, "
