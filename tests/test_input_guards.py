@@ -1,4 +1,4 @@
-"""Guards at the doors: processes with limits, paths, folders of others, sizes, names in plots."""
+"""Bad input is refused where it is read: limits, paths, folders of others, sizes, plots."""
 
 from __future__ import annotations
 
