@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from typing import Any
 
@@ -19,15 +19,57 @@ from cell.fixtures.soft_jig.parameters import FULL_VACUUM
 from cell.fixtures.soft_jig.soft.bed import Bed
 from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 from experiments.jig.element_rig import Drag, ElementRig
-from experiments.jig.specimens import Prism
+from experiments.jig.specimens import FRICTION, Prism
 
 Array = NDArray[np.float64]
 
 CYLINDER = Prism()
+LYING = Prism(lying=True)
 PUSH_HEIGHT = 0.040  # Above the apex of the bed [m].
+SPEED = 0.020  # Of a push or pull, as in the reference [m/s].
 END = np.pi * CYLINDER.radius**2  # Area of an end face of the cylinder [m2].
 REFERENCE_PRESSURE = 1e3  # Surcharge on the soft dome of the reference [Pa].
-SIDEWAYS, UP = np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0])
+SIDEWAYS, ACROSS, UP = np.eye(3)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A cylinder in the frozen bed that is moved until it gives way.
+
+    Attributes:
+        action: "push" (standing, sideways), "pull" (standing, upwards), "across" or "along" (lying,
+            at its centre of mass).
+        sealed: Whether the part is pressed down by the whole vacuum; else air reaches the gap.
+        depth: Of its lowest point below the apex [m].
+        vacuum: [Pa].
+        bed: "dome" as the bag is, or "cup": flat, in a rigid wall.
+    """
+
+    action: str
+    sealed: bool
+    depth: float
+    vacuum: float = FULL_VACUUM
+    bed: str = "dome"
+
+    @property
+    def test(self) -> str:
+        """Its name in the reference."""
+        kind = "sealed" if self.sealed else "vented"
+        return f"{self.action}, {kind}, {self.depth * 1e3:.0f} mm"
+
+    def run(self, part: Prism = CYLINDER, time_step: float = 1e-3) -> Drag:
+        """Press, freeze, let go, and move the part."""
+        lying = self.action in ("across", "along")
+        part = replace(part, lying=lying)
+        rig = held(self, part, time_step)
+        if lying:
+            direction = ACROSS if self.action == "across" else SIDEWAYS
+            return rig.drag(np.array([0.0, 0.0, part.length / 2]), direction, 0.005, SPEED)
+        if self.action == "push":
+            top = np.array([0.0, 0.0, PUSH_HEIGHT + self.depth])
+            return rig.drag(top, SIDEWAYS, 0.006, SPEED)
+        # The spring stretches by 50 mm/kN.
+        return rig.drag(np.array([0.0, 0.0, part.length]), UP, 0.009, SPEED)
 
 
 def reference() -> dict[str, Any]:
@@ -36,14 +78,22 @@ def reference() -> dict[str, Any]:
     return yaml.safe_load(text)
 
 
-def parameters(vacuum: float = 90e3, sealed: bool = False) -> JigParameters:
-    """Return the default parameters with a vacuum [Pa], vented or perfectly sealed."""
+def parameters(vacuum: float = 90e3, sealed: bool = False, bed: str = "dome") -> JigParameters:
+    """Return the default parameters with the friction of the reference.
+
+    Args:
+        vacuum: [Pa].
+        sealed: Perfectly; else vented.
+        bed: "dome" or "cup".
+    """
     params = JigParameters()
     # A bag bridges to a part around its edge: suction acts on 11.3 cm2 under an end of 9.6 cm2.
     strength = FULL_VACUUM * reference()["sealed_area_ratio"]
     perfect = replace(params.suction, strength=strength, lip=0.0, reach=1.0, slip=1.0)
     suction = perfect if sealed else replace(params.suction, enabled=False)
-    return replace(params, vacuum=replace(params.vacuum, pressure=vacuum), suction=suction)
+    jammed = replace(params.jammed, friction=FRICTION)  # Both alike: their mean is the pair's.
+    vacuum_pump = replace(params.vacuum, pressure=vacuum)
+    return replace(params, vacuum=vacuum_pump, suction=suction, jammed=jammed)
 
 
 def punch(
@@ -91,32 +141,17 @@ def residual(bed: Bed, depth: float) -> float:
 
 def frozen_punch() -> Drag:
     """Press a cylinder that stands 5 mm deep in the frozen bed down until the bed fails."""
-    rig = held(0.005, FULL_VACUUM, sealed=False)
+    rig = held(Case("punch", sealed=False, depth=0.005))
     return rig.drag(np.array([0.0, 0.0, CYLINDER.length]), -UP, way=0.030, speed=0.05)
 
 
-def held(
-    depth: float, vacuum: float, sealed: bool, part: Prism = CYLINDER, time_step: float = 1e-3
-) -> ElementRig:
+def held(case: Case, part: Prism = CYLINDER, time_step: float = 1e-3) -> ElementRig:
     """Return a rig whose part is held by the frozen bed alone."""
-    rig = ElementRig(parameters(vacuum, sealed), part, time_step=time_step)
-    rig.lower_to(depth)
+    rig = ElementRig(parameters(case.vacuum, case.sealed, case.bed), part, time_step=time_step)
+    rig.lower_to(case.depth)
     rig.jam()
     rig.let_go()
     return rig
-
-
-def push(depth: float, vacuum: float = 90e3, sealed: bool = False) -> Drag:
-    """Push the standing cylinder sideways, `PUSH_HEIGHT` above the apex."""
-    rig = held(depth, vacuum, sealed)
-    return rig.drag(np.array([0.0, 0.0, PUSH_HEIGHT + depth]), SIDEWAYS, speed=0.02)
-
-
-def pull(depth: float, vacuum: float = 90e3, sealed: bool = False) -> Drag:
-    """Pull the standing cylinder out vertically."""
-    rig = held(depth, vacuum, sealed)
-    # The spring stretches by 50 mm/kN.
-    return rig.drag(np.array([0.0, 0.0, CYLINDER.length]), UP, way=0.009, speed=0.02)
 
 
 def lateral_formula(depth: float, vacuum: float, sealed: bool) -> float:
