@@ -108,7 +108,7 @@ def _punch_soft_bed(results: Results) -> None:
 
 
 def _punch_frozen_bed(results: Results) -> None:
-    bearing = Strength.of(JigParameters().soil, FULL_VACUUM).bearing * END
+    bearing = Strength(FULL_VACUUM, JigParameters().soil.friction_angle).bearing * END
     drag = frozen_punch()
     results.rows.append(Row("frozen punch, largest load; c Nc A [N]", drag.force.max(), bearing))
     sunk = float(drag.way[np.argmax(drag.force)]) * 1e3

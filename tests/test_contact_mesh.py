@@ -20,7 +20,6 @@ from cell.fixtures.soft_jig.mesh.polygons import (
     outline,
     subtract,
 )
-from cell.fixtures.soft_jig.mesh.rings import FOOT_GAP
 from cell.fixtures.soft_jig.mesh.tet_mesh import BadMesh, TetMesh
 from cell.fixtures.soft_jig.parameters import JigParameters
 from cell.fixtures.soft_jig.soft.bed import Bed
@@ -28,7 +27,7 @@ from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 
 PARAMS = JigParameters()
 # Depth to which the rim of a wall overlaps the part [m].
-RIM_SQUEEZE = 2 * abs(PARAMS.jammed.squeeze) + FOOT_GAP
+RIM_SQUEEZE = 2 * abs(PARAMS.jammed.squeeze)
 SQUARE = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]])
 
 
@@ -138,7 +137,7 @@ def test_floor_shares_the_facets_of_a_standing_part() -> None:
     bottom = hulls[0][:, 2].min()
     top = np.abs(mesh.vertices[:, 2] - bottom) < 1e-9
     rim = np.hypot(*mesh.vertices[top, :2].T)
-    assert np.sum(np.abs(rim - (0.0175 + FOOT_GAP / np.cos(np.pi / 24))) < 1e-8) == 24
+    assert np.sum(np.abs(rim - 0.0175) < 1e-8) == 24
 
 
 def test_wall_closes_on_the_part_by_the_squeeze() -> None:
@@ -150,7 +149,7 @@ def test_wall_closes_on_the_part_by_the_squeeze() -> None:
     radius = np.hypot(*mesh.vertices[rim, :2].T) * np.cos(np.pi / 24)
     apothem = 0.0175 * np.cos(np.pi / 24)
     assert np.sum(rim) >= 24
-    assert (radius.mean() + apothem + FOOT_GAP) / 2 == pytest.approx(
+    assert (radius.mean() + apothem) / 2 == pytest.approx(
         apothem + PARAMS.jammed.squeeze, abs=1e-6
     )
 

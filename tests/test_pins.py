@@ -15,7 +15,7 @@ from cell.fixtures.soft_jig.soft.bed import Bed
 
 WIDTH, LENGTH = 0.002, 0.020
 MODULUS = 4e8
-STRENGTH = Strength.of(SoilParameters(), 90e3)
+STRENGTH = Strength(90e3, SoilParameters().friction_angle)
 STAYS = np.eye(3)
 HEAVY = np.diag([1.0, 1.0, 1.0, 10.0, 10.0, 10.0])
 PARAMS = JigParameters()

@@ -49,10 +49,10 @@ def patch_on_top(depth: float, excess: float, gradient: float = 2.5e8) -> Patch:
 
 def test_strength_follows_the_formulas_of_soil_mechanics() -> None:
     """90 kPa and 25 deg: 132 kPa on a wall, c Nc = 0.87 MPa on a floor [D]."""
-    strength = Strength.of(SoilParameters(), 90e3)
+    strength = Strength(90e3, SoilParameters().friction_angle)
     assert strength.lateral == pytest.approx(132e3, rel=0.005)
     assert strength.bearing == pytest.approx(0.87e6, rel=0.005)
-    assert Strength.of(SoilParameters(), 45e3).lateral == pytest.approx(strength.lateral / 2)
+    assert Strength(45e3, SoilParameters().friction_angle).lateral == pytest.approx(strength.lateral / 2)
     wall_and_floor = strength.limit(np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     assert wall_and_floor == pytest.approx([strength.lateral, strength.bearing])
 

@@ -101,7 +101,6 @@ def punch(
     speed: float = 0.01,
     step: float = 1e-3,
     membrane: bool = True,
-    shoulder: bool = False,
 ) -> tuple[Array, Bed]:
     """Press a flat punch into the soft bed.
 
@@ -110,7 +109,6 @@ def punch(
         speed: Of the punch [m/s].
         step: Time step [s].
         membrane: False: only the weight of the beads and the surcharge of the reference confine it.
-        shoulder: Let the bed beside the punch sink as in the dome of the reference.
 
     Returns:
         Depth [m] and pressure [Pa] per step (n, 2), and the bed.
@@ -119,8 +117,6 @@ def punch(
     soil = params.soil
     if not membrane:
         soil = replace(soil, membrane_modulus=0.0, gravity_pressure=REFERENCE_PRESSURE)
-    if shoulder:
-        soil = replace(soil, shoulder_share=0.85, collar_place=0.030)
     bed = Bed(params.bag, soil)
     samples = SurfaceSamples.of("punch", CYLINDER.mesh())
     rows, still = [], np.zeros(3)
@@ -161,7 +157,7 @@ def lateral_formula(depth: float, vacuum: float, sealed: bool) -> float:
     radius, and A the area under suction in the reference, slightly more than the end face.
     """
     soil, radius = JigParameters().soil, CYLINDER.radius
-    wall = Strength.of(soil, vacuum + soil.gravity_pressure).lateral * 2 * radius * depth
+    wall = Strength(vacuum + soil.gravity_pressure, soil.friction_angle).lateral * 2 * radius * depth
     sucked = vacuum * reference()["sealed_area_ratio"] * END if sealed else 0.0
     moment = (CYLINDER.mass * 9.81 + sucked) * radius + wall * depth / 2
     return float(moment / (PUSH_HEIGHT + depth))

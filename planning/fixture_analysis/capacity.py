@@ -27,7 +27,7 @@ def wall_strength(jig: JigParameters) -> float:
     """Return what a wall of frozen beads withstands per area, 2 c sqrt(K_p) [Pa]."""
     # An infinite factor turns yielding off in the simulation; statics need the beads' own strength.
     factor = jig.jammed.strength if np.isfinite(jig.jammed.strength) else 1.0
-    return Strength.of(jig.soil, factor * jig.vacuum.pressure).lateral
+    return Strength(factor * jig.vacuum.pressure, jig.soil.friction_angle).lateral
 
 
 def sideways_capacity(
