@@ -177,9 +177,8 @@ class ElementRig:
         self.step(round(0.5 / self.time_step))
 
     def let_go(self, wait: float = 0.5) -> None:
-        """Open the grip, retract the carriage and wait [s]."""
+        """Open the grip of the carriage, which nothing touches, and wait [s]."""
         self.plant.SetConstraintActiveStatus(self.context, self._grip, False)
-        self._set_height(0.3, 0.0)
         self.step(round(wait / self.time_step))
 
     def drag(self, p_PQ: Array, direction: Array, way: float = 0.006, speed: float = 0.01) -> Drag:
