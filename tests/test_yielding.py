@@ -15,6 +15,7 @@ from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import Prism
 
 UP = np.array([0.0, 0.0, 1.0])
+STILL = (np.zeros(3), np.zeros(3))
 
 
 def block() -> TetMesh:
@@ -58,13 +59,13 @@ def test_strength_follows_the_formulas_of_soil_mechanics() -> None:
 
 
 def test_relief_is_the_excess_pressure_times_the_area_into_the_bed() -> None:
-    force, torque = patch_on_top(1e-3, 2e4).relief(np.array([0.0, 0.0, 0.02]))
+    force, torque = patch_on_top(1e-3, 2e4).relief(np.array([0.0, 0.0, 0.02]), STILL, 1e5, 1e-3)
     assert force == pytest.approx([0, 0, -2e4 * 100 * 4e-6])
     assert torque == pytest.approx(np.zeros(3), abs=1e-9)
 
 
 def test_nothing_is_relieved_below_the_limit() -> None:
-    force, _ = patch_on_top(1e-3, -1.0).relief(np.zeros(3))
+    force, _ = patch_on_top(1e-3, -1.0).relief(np.zeros(3), STILL, 1e5, 1e-3)
     assert not force.any()
     assert plastic_return(block(), [patch_on_top(1e-3, -1.0)], 1e-5) is None
 
