@@ -55,7 +55,7 @@ PARAMETERS = (
     "jig.soil.membrane_modulus",
     "jig.soil.friction_angle",
     "jig.jammed.friction",
-    "jig.jammed.pressure_gradient",
+    "jig.jammed.modulus",
     "jig.suction.strength",
 )
 AS_CONFIGURED = "as configured"

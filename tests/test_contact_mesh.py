@@ -65,7 +65,12 @@ POSTURES = {
 }
 
 
-def pressed(hulls: list[NDArray[np.float64]], euler_deg: Sequence[float], force: float = 20.0):
+def pressed(
+    hulls: list[NDArray[np.float64]],
+    euler_deg: Sequence[float],
+    force: float = 20.0,
+    aside: float = 0.0,
+):
     """Press convex hulls into a bed quasi-statically and freeze it; return bed and hulls in J."""
     R_JP = Rotation.from_euler("xyz", euler_deg, degrees=True).as_matrix()
     mesh = trimesh.util.concatenate([trimesh.convex.convex_hull(h) for h in hulls])
@@ -74,7 +79,7 @@ def pressed(hulls: list[NDArray[np.float64]], euler_deg: Sequence[float], force:
     corners = np.concatenate(hulls) @ R_JP.T
     center = (corners.min(axis=0) + corners.max(axis=0)) / 2
     bed = Bed(PARAMS.bag, PARAMS.soil)
-    p_JP = np.array([-center[0], -center[1], PARAMS.bag.cap_height - corners[:, 2].min()])
+    p_JP = np.array([aside - center[0], -center[1], PARAMS.bag.cap_height - corners[:, 2].min()])
     carried = 0.0
     while carried < force:
         p_JP[2] -= 2e-5
@@ -149,9 +154,7 @@ def test_wall_closes_on_the_part_by_the_squeeze() -> None:
     radius = np.hypot(*mesh.vertices[rim, :2].T) * np.cos(np.pi / 24)
     apothem = 0.0175 * np.cos(np.pi / 24)
     assert np.sum(rim) >= 24
-    assert (radius.mean() + apothem) / 2 == pytest.approx(
-        apothem + PARAMS.jammed.squeeze, abs=1e-6
-    )
+    assert (radius.mean() + apothem) / 2 == pytest.approx(apothem + PARAMS.jammed.squeeze, abs=1e-6)
 
 
 def test_wall_of_a_leaning_part_leans_with_it() -> None:

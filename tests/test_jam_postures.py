@@ -82,7 +82,7 @@ def test_part_rests_in_the_imprint(held) -> None:
 
 
 def test_only_what_the_hulls_leave_out_is_a_pin(held) -> None:
-    """Standing, 97 mm2 of rear boss and 77 of terminals; lying, what touches beyond its ends."""
+    """Standing, 97 mm2 of rear boss and 77 of terminals; lying, what is buried beyond its ends."""
     rig, *_ = held
     (pins,) = rig.jig.memory(rig.root).holding.pins.values()
     name, up = rig.part.part.name, rig.part.up
@@ -95,7 +95,7 @@ def test_only_what_the_hulls_leave_out_is_a_pin(held) -> None:
         assert pins.areas[np.abs(radius - 0.0112) < 0.0016].sum() == pytest.approx(77e-6, abs=8e-6)
         assert np.all(z < -0.053)
     else:
-        assert 10e-6 < pins.areas.sum() < 80e-6
+        assert pins.areas.sum() < 80e-6
         assert np.all((z < -0.053) | (z > 0))
     # Seen from above its slot is open.
-    assert pins.normals[:, 2].max() < 0.1
+    assert np.all(pins.normals[:, 2] < 0.1)

@@ -98,3 +98,22 @@ def test_sheared_bed_is_the_same_surface() -> None:
     assert np.abs(error).max() < 5e-5
     xy = view.from_sheared(surface)[:, :2]
     assert xy == pytest.approx(np.stack([bed.x[bed.active], bed.y[bed.active]], axis=1))
+
+
+@pytest.mark.parametrize("toward_deg", [0, 100, 258])
+@pytest.mark.parametrize("posture", ["motor lying", "plate on its foot", "plate on its side"])
+def test_bed_of_a_part_that_leans_far_beside_the_middle_is_valid(
+    posture: str, toward_deg: float
+) -> None:
+    """15 degrees, 30 mm off the middle: the part hangs over the border of the bag."""
+    hulls, up = POSTURES[posture]
+    toward = np.radians(toward_deg)
+    tilt = np.radians(15.0) * np.array([np.cos(toward), np.sin(toward), 0])
+    R_JP = Rotation.from_rotvec(tilt) * Rotation.align_vectors([[0, 0, 1]], [up])[0]
+    angles = R_JP.as_euler("xyz", degrees=True).tolist()
+    bed, hulls_J = pressed(hulls, angles, aside=0.030)
+    axis = R_JP.apply(up)
+    mesh = imprint_mesh(bed, PARAMS.jammed, hulls_J, axis[:2] / axis[2])
+    surface = trimesh.Trimesh(mesh.vertices, mesh.boundary(), process=False)
+    assert mesh.volumes().min() > 0
+    assert surface.is_watertight

@@ -8,7 +8,7 @@ from test_contact_mesh import PARAMS, box, pressed
 
 from cell.fixtures.soft_jig.mesh.contact_mesh import imprint_mesh
 from cell.fixtures.soft_jig.mesh.polygons import edge_normals
-from cell.fixtures.soft_jig.mesh.rings import outward_directions
+from cell.fixtures.soft_jig.mesh.rings import BESIDE, outward_directions
 
 
 def loop_around(corners: list[tuple[float, float]], longest: float = 0.006) -> np.ndarray:
@@ -48,7 +48,7 @@ def test_columns_do_not_cross(corners: list[tuple[float, float]]) -> None:
 
 def test_wall_of_a_bar_is_as_high_as_the_bed_beside_it() -> None:
     """Along both sides, although the border of the bar lies in the middle of cells."""
-    bed, hulls = pressed([box([-0.02, -0.0025, 0], [0.02, 0.0025, 0.03])], [0, 0, 20], force=2.0)
+    bed, hulls = pressed([box([-0.02, -0.0025, 0], [0.02, 0.0025, 0.03])], [0, 0, 20], force=8.0)
     mesh = imprint_mesh(bed, PARAMS.jammed, hulls)
     bottom, turn = hulls[0][:, 2].min(), np.radians(20)
     R_JB = np.array([[np.cos(turn), -np.sin(turn)], [np.sin(turn), np.cos(turn)]])
@@ -56,8 +56,8 @@ def test_wall_of_a_bar_is_as_high_as_the_bed_beside_it() -> None:
     p_B = (mesh.vertices[:, :2] - center) @ R_JB
     along_sides = (np.abs(np.abs(p_B[:, 1]) - 0.0025) < 2e-4) & (np.abs(p_B[:, 0]) < 0.019)
     rim = along_sides & (mesh.vertices[:, 2] > bottom + 1e-3)
-    outside = p_B[rim] + np.sign(p_B[rim]) * [0, 0.004]
+    outside = p_B[rim] + np.sign(p_B[rim]) * [0, BESIDE]
     assert rim.sum() >= 4
     assert mesh.vertices[rim, 2] == pytest.approx(
-        bed.height_at(outside @ R_JB.T + center), abs=1e-3
+        bed.height_beside(outside @ R_JB.T + center), abs=1e-3
     )

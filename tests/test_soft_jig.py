@@ -14,6 +14,8 @@ from cell.errors import InputError
 from cell.fixtures.base import FixtureError
 from cell.fixtures.soft_jig import JigParameters, JigState
 from cell.fixtures.soft_jig.parameters import VacuumParameters
+from experiments.jig.element_rig import ElementRig
+from experiments.jig.specimens import Prism
 
 # A short press that still reaches the drive's limit of 20 N.
 FAST = {"speed": 0.04, "duration": 0.8}
@@ -195,3 +197,10 @@ def test_imprint_closes_with_the_vacuum() -> None:
     """Beads contract with about p^0.7: not at all where nothing is pumped out, half at 30 kPa."""
     shares = [VacuumParameters().closing(pressure) for pressure in (0.0, 30e3, 90e3)]
     assert shares == pytest.approx([0.0, 0.463, 1.0], abs=1e-3)
+
+
+def test_friction_is_the_same_soft_and_frozen() -> None:
+    """Drake combines 0.9 of the membrane and 0.5 of the part harmonically: 0.64."""
+    rig = ElementRig(part=Prism())
+    (samples,) = rig.jig.memory(rig.root).pressing.values()
+    assert samples.friction == pytest.approx(2 * 0.9 * 0.5 / (0.9 + 0.5))

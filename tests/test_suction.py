@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from cell.fixtures.soft_jig.frozen.suction import Seal, sealed_squares
-from cell.fixtures.soft_jig.parameters import SuctionParameters
+from cell.fixtures.soft_jig.parameters import JigParameters, SuctionParameters
+from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
+from experiments.jig.specimens import Prism
 
 CELL, LIP = 1.5e-3, 3e-3
 N = 41
@@ -91,3 +96,27 @@ def test_restored_seal_pulls_bit_for_bit_the_same() -> None:
 def test_suction_is_proportional_to_the_vacuum_and_can_be_switched_off() -> None:
     assert PARAMS.pressure(45e3) == pytest.approx(PARAMS.strength / 2)
     assert SuctionParameters(enabled=False).pressure(90e3) == 0.0
+
+
+def sucked_on(facets: int, cell: float, lying: bool) -> float:
+    """Return the sealed area of a cylinder pressed 10 mm into a soft bed [m2]."""
+    params, part = JigParameters(), Prism(facets=facets, lying=lying)
+    bed = Bed(replace(params.bag, cell=cell), params.soil)
+    R_JP = part.X_CP.rotation().matrix()
+    samples = SurfaceSamples.of("part", part.mesh())
+    for depth in np.linspace(0.0, 0.010, 251)[1:]:
+        p_JP = part.X_CP.translation() + [0.0, 0.0, params.bag.cap_height - depth]
+        motion = (np.zeros(3), np.array([0.0, 0.0, -0.04]))
+        bed.press((R_JP, p_JP), motion, samples, 1e-3)
+        bed.settle(1e-3)
+    return float(Seal.under(bed, samples, (R_JP, p_JP), params.suction.lip).areas.sum())
+
+
+@pytest.mark.parametrize("lying", [False, True])
+def test_sealed_area_depends_neither_on_facets_nor_on_cells(lying: bool) -> None:
+    """24, 36 and 72 facets, cells of 2, 1.5 and 1 mm: within 10 %."""
+    areas = [sucked_on(facets, 1.5e-3, lying) for facets in (24, 36, 72)]
+    areas += [sucked_on(36, cell, lying) for cell in (2e-3, 1e-3)]
+    assert max(areas) < 1.1 * min(areas)
+    if not lying:
+        assert areas[0] == pytest.approx(np.pi * (0.0175 - LIP) ** 2, rel=0.1)

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from cell.fixtures.soft_jig import JigParameters
 from cell.fixtures.soft_jig.frozen.yielding import Patch, Strength, plastic_return
 from cell.fixtures.soft_jig.mesh.tet_mesh import TetMesh
 from cell.fixtures.soft_jig.parameters import SoilParameters
 from experiments.jig.element_rig import ElementRig
+from experiments.jig.element_tests import parameters
 from experiments.jig.specimens import Prism
 
 UP = np.array([0.0, 0.0, 1.0])
@@ -53,9 +53,27 @@ def test_strength_follows_the_formulas_of_soil_mechanics() -> None:
     strength = Strength(90e3, SoilParameters().friction_angle)
     assert strength.lateral == pytest.approx(132e3, rel=0.005)
     assert strength.bearing == pytest.approx(0.87e6, rel=0.005)
-    assert Strength(45e3, SoilParameters().friction_angle).lateral == pytest.approx(strength.lateral / 2)
+    half = Strength(45e3, SoilParameters().friction_angle)
+    assert half.lateral == pytest.approx(strength.lateral / 2)
     wall_and_floor = strength.limit(np.array([[1.0, 0, 0], [0, 0, 1.0]]))
     assert wall_and_floor == pytest.approx([strength.lateral, strength.bearing])
+
+
+def test_strength_of_an_inclined_face_is_between_wall_and_floor() -> None:
+    """Slip lines: p (Kp exp(2 a tan(phi)) - 1), 371 kPa at 45 deg [D]; up or down alike."""
+    strength = Strength(90e3, SoilParameters().friction_angle)
+    half = np.sqrt(0.5) * np.array([[1.0, 0, 1.0], [0, 1.0, -1.0]])
+    assert strength.limit(half) == pytest.approx(371e3, rel=0.005)
+
+
+def test_relief_leaves_the_viscous_pressure_at_any_step() -> None:
+    """At 20 mm/s the pressure gains k v dt in a step; the relief runs ahead, and eta v is left."""
+    patch, viscosity, gradient = patch_on_top(1e-3, 2e4), 1e5, 2.5e8
+    sinking = (np.zeros(3), np.array([0.0, 0.0, -0.02]))
+    for dt in (1e-3, 0.5e-3):
+        force, _ = patch.relief(np.zeros(3), sinking, viscosity, dt)
+        left = 2e4 + gradient * 0.02 * dt + force[2] / (100 * 4e-6)
+        assert left == pytest.approx(viscosity * 0.02)
 
 
 def test_relief_is_the_excess_pressure_times_the_area_into_the_bed() -> None:
@@ -90,10 +108,10 @@ def test_plastic_return_never_folds_the_mesh_over() -> None:
 
 @pytest.fixture(scope="module")
 def weak_wall() -> tuple[float, float]:
-    """Return the lateral capacity of a cylinder 15 mm deep: at full strength and at a tenth [N]."""
+    """Return the lateral capacity of a vented cylinder, at full strength and at a tenth [N]."""
     forces = []
     for strength in (1.0, 0.1):
-        params = JigParameters()
+        params = parameters()
         jammed = replace(params.jammed, strength=strength)
         rig = ElementRig(replace(params, jammed=jammed), Prism(facets=12))
         rig.lower_to(0.015, speed=0.04)
@@ -106,6 +124,6 @@ def weak_wall() -> tuple[float, float]:
 def test_lateral_capacity_falls_with_the_strength_of_the_walls(
     weak_wall: tuple[float, float],
 ) -> None:
-    """In the plant: at a tenth of the strength the capacity is far smaller, but not zero."""
+    """In the plant: at a tenth of the strength it is much smaller; the weight is left."""
     strong, weak = weak_wall
-    assert 0.5 < weak < 0.4 * strong
+    assert 0.5 < weak < 0.8 * strong

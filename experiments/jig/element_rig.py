@@ -198,13 +198,17 @@ class ElementRig:
             V_WQ = V_WP.Shift(self.X_JP.rotation() @ p_PQ)
             rate = float(direction @ V_WQ.translational())
             force = DRAG_STIFFNESS * (target - moved) + DRAG_DAMPING * (speed - rate)
-            pull = SpatialForce(np.zeros(3), max(force, 0.0) * direction)
-            self._forces.fix(self.root, "external", [applied_force(self.body.index(), p_PQ, pull)])
+            self.pull(p_PQ, max(force, 0.0) * direction)
             self.step()
             turn = (R_JP0.inverse() @ self.X_JP.rotation()).ToAngleAxis().angle()
             rows.append((moved, max(force, 0.0), turn))
         self._forces.fix(self.root, "external", [])
         return Drag(*np.array(rows).T)
+
+    def pull(self, p_PQ: Array, force: Array) -> None:
+        """Let a force (3,) [N] in J act at a point (3,) of the part, in P, until the next one."""
+        pull = SpatialForce(np.zeros(3), force)
+        self._forces.fix(self.root, "external", [applied_force(self.body.index(), p_PQ, pull)])
 
     @property
     def speed(self) -> float:

@@ -257,5 +257,5 @@ def _imprint(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne:
     volume = float(np.maximum(cap - bed.heights, 0.0).sum()) * cell**2
     outline = footprint(np.column_stack([bed.x[bearing], bed.y[bearing]]))
     return Imprint(
-        depth, borne, volume, bed.displaced, cell, bed.heights - low, under - low, outline
+        depth, borne, volume, bed.ledger.waiting, cell, bed.heights - low, under - low, outline
     )
