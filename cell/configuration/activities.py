@@ -53,16 +53,15 @@ class PushConfig:
         "[A] 2 mm, plausible 0.5-5 mm.",
         at_least=0.0, at_most=0.02,
     )  # fmt: skip
-    height_fraction: float = setting(
-        0.6, "", "Height of the fingers' lowest point, relative to the exposed height of the "
-        "pushed face.",
-        "[A] 0.6, plausible 0.5-0.7.",
-        above=0.0, at_most=1.0,
-    )  # fmt: skip
-    bed_clearance: float = setting(
-        2e-3, "m", "Least distance of the fingers from the bed below.",
-        "[A] Own choice.",
+    fingertip_height: float = setting(
+        2e-3, "m", "Height of the fingers' lowest point above the bed beside the pushed face.",
+        "[D] The lying plate stands out by 2 to 4 mm; a fingertip that clears the membrane meets it.",
         at_least=0.0, at_most=0.1,
+    )  # fmt: skip
+    palm_height: float = setting(
+        46.5e-3, "m", "Palm above the fingertips of the hand that pushes on the rig.",
+        "[R] Hand-E, data sheet, with its own fingers; those of the model are longer.",
+        at_least=0.01, at_most=0.2,
     )  # fmt: skip
     grasp_position_sigma: float = setting(
         5e-4, "m", "Standard deviation of the part's position in the grasp, per axis.",

@@ -93,10 +93,9 @@ def push_line(
 ) -> PushLine:
     """Return the straight line of the tip frame T of the closed hand in a push.
 
-    One rule for all cases: the lowest point of the fingers is at `height_fraction` of the exposed
-    height of the pushed face at the point of contact, and at least `bed_clearance` above the bed;
-    the hand points down with the narrow sides of its fingers leading and starts `start_gap` before
-    contact.
+    One rule for all cases, see docs/physics/push_experiment.md: the lowest point of the fingers is
+    `fingertip_height` above the bed at the foot of the pushed face; the hand points down with the
+    narrow sides of its fingers leading and starts `start_gap` before contact, of finger or palm.
 
     Args:
         stage: Part, jig and hand.
@@ -114,9 +113,7 @@ def push_line(
     if np.hypot(*direction[:2]) < LEVEL:
         raise PhaseFailed("approach", "the part lies on the face that is to be pushed")
     direction = np.array([direction[0], direction[1], 0.0]) / np.hypot(*direction[:2])
-    bed = bed_height(stage, root, X_WJ, foot[:2])
-    low = max(foot[2], bed)
-    height = max(low + numbers.height_fraction * (top[2] - low), bed + numbers.bed_clearance)
+    height = bed_height(stage, root, X_WJ, foot[:2]) + numbers.fingertip_height
     fingers = Fingers.of_hand(stage)
     travel = fingers.travel(X_WP @ stage.surface.T, top[:2], height, direction)
     if not np.isfinite(travel):

@@ -155,6 +155,7 @@ class RigHand:
         simulation = self.simulation
         simulation.begin("approach")
         simulation.jaws(0.0)
+        simulation.lower_palm()
         simulation.sleep()
         start, up = HandPose.of(line.X_WT), np.array([0.0, 0.0, 1.0])
         high = start.p_WT + ABOVE * up - BEHIND_ABOVE * line.direction

@@ -40,6 +40,7 @@ from cell.products.product import Product
 from cell.sleep import Sleep
 from cell.workpieces.parts import add_parts
 from cell.workpieces.work import fixture_work
+from experiments.paper.rig.palm import LowPalm
 from experiments.paper.rig.stage import Stage
 
 # Drives of the carriage: stiffness, damping and largest effort; slides [N/m, N s/m, N], turn and
@@ -95,6 +96,7 @@ class Rig(Stage):
         drive: Targets of the carriage: x, y, z [m], turn, tilt [rad].
         carriage: Its model instance.
         hand_length: From the carriage to T [m].
+        palm: What lowers the palm for the push; None if it is low already.
         sleeper: Locks part and base while they are at rest.
         monitor: Of the diagram.
     """
@@ -103,6 +105,7 @@ class Rig(Stage):
     drive: JointDrive
     carriage: ModelInstanceIndex
     hand_length: float
+    palm: LowPalm | None
     sleeper: Sleep
     monitor: Monitor
 
@@ -123,6 +126,8 @@ class Rig(Stage):
             q: (5,) joint positions of the carriage.
         """
         self.monitor.initialize(root)
+        if self.palm:
+            self.palm.stay_up(root)
         context = self.plant.GetMyMutableContextFromRoot(root)
         self.jig_base.set_down(root, X_WJ)
         self.part.joint.SetPose(context, X_WP)
@@ -160,6 +165,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     fixture.add_part(plant, loose.body, loose.part.mesh)
     wrist, hand = _add_carriage(plant)
     gripper = Gripper.add(plant, hand, "gripper", HAND_E, jaws)
+    palm = LowPalm.add(plant, scene_graph, hand, HAND_E, config.push.palm_height)
     contact = config.simulation.contact
     links = add_links(plant, scene_graph, contact, [gripper], fixture, [loose])
     plant.Finalize()
@@ -188,6 +194,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
         carriage=carriage,
         gripper=gripper,
         hand_length=float(X_MountT.translation()[2]),
+        palm=palm,
         wrist=WrenchSensor(plant, wrist),
         force_plate=WrenchSensor(plant, workcell.plate_weld),
         sleeper=sleeper,

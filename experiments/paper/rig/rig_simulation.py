@@ -132,6 +132,11 @@ class RigSimulation:
         """Whether the fixture holds at its full strength."""
         return self.rig.fixture.fixed(self.root)
 
+    def lower_palm(self) -> None:
+        """Bring the palm down to where the real hand has it."""
+        if self.rig.palm:
+            self.rig.palm.come_down(self.root)
+
     def sleep(self) -> None:
         """Lock part and jig in place while nothing touches them, to save computation."""
         self.rig.sleeper.put_to_sleep(self.root, self.rig.part.body)
