@@ -14,7 +14,7 @@ from cell.fixtures.soft_jig import SurfaceSamples
 from cell.simulation.phase import PhaseFailed
 from experiments.paper.cases import Case, case_seed, judged
 from experiments.paper.postures import AXES, POSTURES, PUSHES, chosen
-from experiments.paper.push_rule import push_line
+from experiments.paper.push_rule import bed_height, push_line
 from experiments.paper.rest import Rest
 from experiments.paper.rig.rig import HandPose, build_push_rig
 from experiments.paper.rig.rig_simulation import RigSimulation, smooth_path, stroke_path
@@ -130,6 +130,20 @@ def test_rest_is_to_be_slow_for_a_while_without_getting_faster(
     assert found == rests
 
 
+def palm_touches(rig, root) -> set[str]:
+    """Return the models that touch the lowered part of the palm."""
+    query = rig.scene_graph.get_query_output_port().Eval(rig.scene_graph.GetMyContextFromRoot(root))
+    found = set()
+    for pair in query.ComputePointPairPenetration():
+        ids = {pair.id_A, pair.id_B}
+        if rig.palm.geometry in ids:
+            (other,) = ids - {rig.palm.geometry}
+            frame = query.inspector().GetFrameId(other)
+            body = rig.plant.GetBodyFromFrameId(frame)
+            found.add(rig.plant.GetModelInstanceName(body.model_instance()))
+    return found
+
+
 def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
     config, push = motor_rig.config, PUSHES["motor/P2/a"]
     part, X_WJ = motor_rig.part.part, config.workcell.X_WJ
@@ -138,13 +152,33 @@ def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
     pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
     seen = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer
     line = push_line(seen.stage, seen.root, push, seen.X_WJ, seen.X_WP)
-    low = X_WJ.translation()[2] + apex + 0.0063  # The can's rear face: the terminals are 6.3 mm.
+    bed = bed_height(seen.stage, seen.root, X_WJ, X_WP.translation()[:2])
     fingers = line.X_WT.translation()[2] - 0.024  # The noses end 24 mm below the tip frame.
-    assert fingers == pytest.approx(low + 0.6 * 0.0534, abs=1e-4)
+    assert fingers == pytest.approx(bed + 0.002, abs=1e-4)
     assert line.direction == pytest.approx(X_WP.rotation() @ [1.0, 0.0, 0.0])
-    # The pads lead, 8 mm before the tip frame; the gearbox has a radius of 18.4 mm.
+    # The palm leads, 37.5 mm before the tip frame; the gearbox has a radius of 18.4 mm.
     ahead = (line.X_WT.translation() - X_WP.translation()) @ line.direction
-    assert ahead == pytest.approx(-0.0184 - 0.008 - config.push.start_gap, abs=3e-4)
+    assert ahead == pytest.approx(-0.0184 - 0.0375 - config.push.start_gap, abs=3e-4)
+    # A palm above the motor passes: the fingers lead, 9 mm before the tip frame.
+    high = replace(config, push=replace(config.push, palm_height=0.15))
+    rig = build_push_rig(high, load_product("motor_unit"), "motor")
+    line = push_line(rig, rig.diagram.CreateDefaultContext(), push, X_WJ, X_WP)
+    ahead = (line.X_WT.translation() - X_WP.translation()) @ line.direction
+    assert ahead == pytest.approx(-0.0184 - 0.009 - config.push.start_gap, abs=3e-4)
+
+
+def test_palm_comes_down_for_the_push_only(motor_rig) -> None:
+    """It is low over the fingertips, and touches neither its own fingers nor, before, anything."""
+    rig, config = motor_rig, motor_rig.config
+    root = rig.diagram.CreateDefaultContext()
+    X_WJ = config.workcell.X_WJ
+    X_WP = planned_pose(rig.part.part, PUSHES["motor/P2/a"].posture, X_WJ, 0.1)
+    down = HandPose(X_WJ.translation() + [0.0, 0.0, 0.14], 0.0)  # The palm in the motor.
+    rig.set_up(root, X_WJ, X_WP, rig.joints(down))
+    touching = [palm_touches(rig, root)]
+    rig.palm.come_down(root)
+    touching.append(palm_touches(rig, root))
+    assert touching == [set(), {"motor"}]
 
 
 def test_push_that_cannot_be_started_is_a_verdict(motor_rig) -> None:
@@ -154,7 +188,7 @@ def test_push_that_cannot_be_started_is_a_verdict(motor_rig) -> None:
     pose = tip_pose(motor_rig, X_WP, push.posture.grasp)
     seen = RigSimulation(motor_rig, X_WJ, X_WP, pose).observer
     stage, root = seen.stage, seen.root
-    config = replace(stage.config, push=replace(stage.config.push, bed_clearance=0.2))
+    config = replace(stage.config, push=replace(stage.config.push, fingertip_height=0.2))
     with pytest.raises(PhaseFailed, match="miss the part"):
         push_line(replace(stage, config=config), root, push, X_WJ, X_WP)
     fallen = RotationMatrix.MakeYRotation(np.pi / 2) @ X_WP.rotation()
