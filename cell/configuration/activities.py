@@ -55,7 +55,7 @@ class PushConfig:
     )  # fmt: skip
     fingertip_height: float = setting(
         2e-3, "m", "Height of the fingers' lowest point above the bed beside the pushed face.",
-        "[D] The lying plate stands out by 2 to 4 mm; a fingertip that clears the membrane meets it.",
+        "[D] The lying plate stands out by 2 to 4 mm, the membrane is to be cleared.",
         at_least=0.0, at_most=0.1,
     )  # fmt: skip
     palm_height: float = setting(

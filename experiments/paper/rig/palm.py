@@ -55,7 +55,8 @@ class LowPalm:
         """Extend the palm of a hand before the plant is finalized.
 
         Args:
-            plant, scene_graph: Drake's.
+            plant: Drake's.
+            scene_graph: Drake's.
             hand: Model instance of the hand.
             model: Its type.
             height: Of the extended palm above the fingertips [m].
