@@ -4,6 +4,7 @@
     python -m experiments.push_robustness --samples 0 --one-by-one
     python -m experiments.push_robustness --samples 10 --spread 0.3 --case plate/P1
     python -m experiments.push_robustness --samples 0 --numerics --controls
+    python -m experiments.push_robustness --samples 0 --measurable
 
 Parameters that the paper does not give are set once, for all cases and both parts, in the sections
 ``push``, ``placement`` and ``jig`` of the configuration. One follows from a measured number, the
@@ -67,6 +68,18 @@ NUMERICS = {
     "approximation similar": {"simulation.contact_approximation": "similar"},
     "approximation sap": {"simulation.contact_approximation": "sap"},
 }
+# What an experimenter could measure, and the values registered with the rule of the push
+# (docs/physics/push_experiment.md), each for one path in the configuration.
+MEASURABLE: Mapping[str, tuple[float, ...]] = {
+    "push.jig_mass": (1.0, 2.5),
+    "push.base_friction": (0.3, 0.6),
+    "push.fingertip_height": (0.001, 0.005, 0.010),
+    "push.palm_height": (0.030, 0.089),
+    "placement.press_force": (16.0, 24.0),
+    "jig.suction.strength": (0.0, 6e3),
+    "jig.jammed.strength": (0.7, 1.3),
+    "push.speed": (0.1, 0.2),
+}
 CONTROLS = {
     "no suction": {"jig.suction.enabled": False},
     "30 kPa": {"jig.vacuum.pressure": 30e3},
@@ -96,6 +109,10 @@ class RobustnessOptions:
 
     controls: bool = False
     """Also push without suction, at 30 kPa, on the bed left soft, and on a flat rigid plate."""
+
+    measurable: bool = False
+    """Also change what can be measured on a real jig, each alone over its plausible range, and say
+    which cases it decides."""
 
     workers: Annotated[int, arg(metavar="N")] = 1
     """Trials at a time. What is done already is not run again."""
@@ -153,6 +170,9 @@ def variants(options: RobustnessOptions, config: CellConfig) -> list[Variant]:
         for path in PARAMETERS:
             for change in (options.spread, -options.spread):
                 found.append(Variant(f"{path} {change:+.0%}", scaled(config, {path: 1 + change})))
+    if options.measurable:
+        for path, values in MEASURABLE.items():
+            found += [Variant(f"{path}={value:g}", {path: value}) for value in values]
     for k in range(options.samples):
         factors = 1 + rng.uniform(-options.spread, options.spread, len(PARAMETERS))
         changes = scaled(config, dict(zip(PARAMETERS, factors.tolist(), strict=True)))
@@ -223,6 +243,24 @@ def flips(row: Mapping[str, Any], base: Mapping[str, Any]) -> list[str]:
     ]
 
 
+def decided_by(rows: Sequence[Mapping[str, Any]]) -> dict[str, list[str]]:
+    """Return the cases whose outcome each measurable quantity changes, by its path.
+
+    Args:
+        rows: Of the result, the first as configured.
+    """
+    decided: dict[str, list[str]] = {}
+    for path, values in MEASURABLE.items():
+        own = [row for row in rows if row["variant"] in {f"{path}={value:g}" for value in values}]
+        if own:
+            decided[path] = [
+                label
+                for label, outcome in rows[0]["outcome"].items()
+                if any(row["outcome"][label] != outcome for row in own)
+            ]
+    return decided
+
+
 def robustness_table(rows: Sequence[Mapping[str, Any]]) -> Table:
     """Return a table of the number of joint samples in which each case keeps its outcome."""
     samples = [row for row in rows if row["variant"].startswith("sample")]
@@ -282,11 +320,14 @@ def run(options: RobustnessOptions) -> int:
     with output_folder(Path(options.common.out)) as out:
         rows = run_variants(options, wanted, out, console)
         result = {"command": "push_robustness", "seed": options.common.seed, "rows": rows}
+        result["decided_by"] = decided_by(rows)
         write_json(out / "result.json", result | {"versions": versions()})
     for row in rows[1:]:
         flipped = ", ".join(flips(row, rows[0])) or "none"
         console.print(f"{row['variant']}: flips {flipped}", markup=False)
     console.print(displacement_table(rows))
+    for path, labels in decided_by(rows).items():
+        console.print(f"{path} decides {', '.join(labels) or 'none'}", markup=False)
     if options.samples:
         console.print(robustness_table(rows))
     return 0

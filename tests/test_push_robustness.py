@@ -5,11 +5,13 @@ import pytest
 from cell import CellConfig
 from experiments.push_robustness import (
     CONTROLS,
+    MEASURABLE,
     NUMERICS,
     PARAMETERS,
     RobustnessOptions,
     coasting_speed,
     config_of,
+    decided_by,
     flips,
     main,
     scaled,
@@ -79,3 +81,21 @@ def test_bad_usage_is_named(
 ) -> None:
     assert main(arguments.split()) == 2
     assert culprit in capsys.readouterr().err
+
+
+def test_a_quantity_decides_the_cases_whose_outcome_it_changes() -> None:
+    base = {"variant": "as configured", "outcome": {"a": "success", "b": "failure"}}
+    light = {"variant": "push.jig_mass=1", "outcome": {"a": "success", "b": "success"}}
+    heavy = {"variant": "push.jig_mass=2.5", "outcome": {"a": "success", "b": "failure"}}
+    rough = {"variant": "push.base_friction=0.6", "outcome": {"a": "success", "b": "failure"}}
+    decided = decided_by([base, light, heavy, rough])
+    assert decided == {"push.jig_mass": ["b"], "push.base_friction": []}
+
+
+@pytest.mark.parametrize("path", MEASURABLE)
+def test_measurable_quantities_bracket_the_configured_value(path: str) -> None:
+    values = MEASURABLE[path]
+    configured = value_at(CellConfig(), path)
+    assert configured not in values
+    assert min(values) < configured
+    assert CellConfig.load("default", {path: values[0]}) != CellConfig()
