@@ -48,6 +48,14 @@ def test_operations_that_allow_it_are_stepped_coarsely(running: RunningCell) -> 
         assert running.station.cell is running.simulation.cell
 
 
+def test_one_planning_copy_serves_every_step_size(running: RunningCell) -> None:
+    running.switch(PICK_PLACE)
+    fine = running.station
+    running.switch(PLACE_BOLTS)
+    assert running.station is not fine
+    assert running.station.model is fine.model
+
+
 def test_full_contact_is_never_stepped_coarsely() -> None:
     running = RunningCell(PRODUCT, FULL, seed=0)
     before = running.simulation

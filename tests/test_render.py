@@ -2,6 +2,7 @@
 
 import io
 import subprocess
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -14,7 +15,7 @@ from pydrake.systems.framework import DiagramBuilder
 
 from cell.machines.cameras import rendering
 from cell.machines.cameras.rendering import NoRendering, rendering_problem
-from experiments.reporting.render import View, take_picture
+from experiments.reporting.render import View, take_picture, take_pictures
 
 # From +y, so that +x is on the left of the picture.
 VIEW = View(p_WC=(0.0, 2.0, 0.5), p_WTarget=(0.0, 0.0, 0.5), width=120, height=80)
@@ -84,6 +85,16 @@ def test_picture_leaves_the_state_alone(red_box) -> None:
     np.testing.assert_array_equal(root.get_discrete_state_vector().CopyToVector(), before)
     assert take_picture(scene_graph, root, VIEW) == first
     assert scene_graph.RendererCount() == 0
+
+
+@needs_rendering
+def test_several_views_are_the_pictures_of_each(red_box) -> None:
+    scene_graph, root, place = red_box
+    place((0.1, 0.0, 0.5))
+    views = [VIEW, replace(VIEW, p_WC=(2.0, 0.0, 0.5), width=90)]
+    alone = [take_picture(scene_graph, root, view) for view in views]
+    assert alone[0] != alone[1]
+    assert take_pictures(scene_graph, root, views) == alone
 
 
 @pytest.fixture

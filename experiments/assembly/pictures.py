@@ -6,7 +6,7 @@ from cell.machines.cameras.rendering import rendering_problem
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.run import StepResult
 from experiments.reporting.html_page import Picture
-from experiments.reporting.render import CELL_VIEW, JIG_VIEW, take_picture
+from experiments.reporting.render import CELL_VIEW, JIG_VIEW, take_pictures
 
 VIEWS = {"cell": CELL_VIEW, "jig": JIG_VIEW}
 
@@ -34,7 +34,6 @@ class Pictures:
         if self.problem is None:
             simulation = self.running.simulation
             root, graph = simulation.root, simulation.cell.scene_graph
-            self.taken += [
-                (f"{step.name} ({name})", take_picture(graph, root, view))
-                for name, view in VIEWS.items()
-            ]
+            pictures = take_pictures(graph, root, VIEWS.values())
+            captions = [f"{step.name} ({name})" for name in VIEWS]
+            self.taken += zip(captions, pictures, strict=True)

@@ -147,6 +147,9 @@ class RunningCell:
         monitors = [each.follow(simulation) for each in followers]
         joined = join_monitors(simulation.cell.monitor, *filter(None, monitors))
         simulation.simulator.set_monitor(joined)
-        source = TruthSource.of(simulation.cell, simulation.root, self.seed)
-        station = Station(simulation.cell, simulation.root, source, self.seed, nominal=config)
+        cell, root = simulation.cell, simulation.root
+        source = TruthSource.of(cell, root, self.seed)
+        # Planning does not depend on the time step.
+        known = next((station.model for _, station in self._built.values()), None)
+        station = Station(cell, root, source, self.seed, nominal=config, planning_copy=known)
         return simulation, station

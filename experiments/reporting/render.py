@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
@@ -49,17 +50,26 @@ CELL_VIEW = View(p_WC=(0.8, 1.9, 1.25), p_WTarget=(0.0, 0.05, 0.25))
 JIG_VIEW = View(p_WC=(0.25, 0.6, 0.42), p_WTarget=(0.0, 0.15, 0.25))
 
 
-def take_picture(
-    scene_graph: SceneGraph, root: Context, view: View, *, shadows: bool = True
-) -> bytes:
-    """Return a PNG of the scene in its present state; arguments as of `rendering`.
+def take_pictures(
+    scene_graph: SceneGraph, root: Context, views: Iterable[View], *, shadows: bool = True
+) -> list[bytes]:
+    """Return a PNG of each view of the scene in its present state; arguments as of `rendering`.
 
     Raises:
         NoRendering: This machine cannot render.
     """
+    world = scene_graph.world_frame_id()
     with rendering(scene_graph, root, shadows=shadows) as query:
-        image = query.RenderColorImage(view.camera(), scene_graph.world_frame_id(), view.X_WC)
-    return png(image.data[:, :, :3])
+        images = [query.RenderColorImage(view.camera(), world, view.X_WC) for view in views]
+    return [png(image.data[:, :, :3]) for image in images]
+
+
+def take_picture(
+    scene_graph: SceneGraph, root: Context, view: View, *, shadows: bool = True
+) -> bytes:
+    """Return a PNG of one view, as `take_pictures`."""
+    (picture,) = take_pictures(scene_graph, root, [view], shadows=shadows)
+    return picture
 
 
 def png(pixels: np.ndarray) -> bytes:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import InitVar, dataclass, field
 
 import numpy as np
 from pydrake.math import RigidTransform
@@ -54,6 +54,7 @@ class Station:
         source: How it sees where parts are.
         seed: Seeds every sampling planner, together with the number of the call.
         nominal: What the planner believes the cell to be; None: exactly as it was built.
+        planning_copy: That of a cell with the same arms, parts and surroundings; None: a new one.
         context: Context of the plant, only read: joint angles of arms and tools.
         belief: Where the parts are, as far as it knows.
         model: The planning copy.
@@ -71,6 +72,7 @@ class Station:
     source: Source
     seed: int
     nominal: CellConfig | None = None
+    planning_copy: InitVar[CollisionModel | None] = None
     context: Context = field(init=False)
     belief: Belief = field(init=False)
     model: CollisionModel = field(init=False)
@@ -83,10 +85,10 @@ class Station:
     held_opening: float = 0.0
     _calls: int = 0
 
-    def __post_init__(self) -> None:
+    def __post_init__(self, planning_copy: CollisionModel | None) -> None:
         self.context = self.cell.plant.GetMyContextFromRoot(self.root)
         self.belief = Belief(self.source, hand=lambda: self.tool_pose(self.holder, "tip"))
-        self.model = collision_model(self.cell, self.config)
+        self.model = planning_copy or collision_model(self.cell, self.config)
 
     @property
     def config(self) -> CellConfig:
