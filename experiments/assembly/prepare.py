@@ -12,6 +12,7 @@ from cell.configuration.config import CellConfig
 from cell.errors import InputError
 from cell.monitor import join_monitors
 from cell.products.product import Product
+from cell.simulation.settling import settle
 from cell.simulation.simulation import Simulation
 from cell.simulation.state import State, hand_over, restore_state, save_state
 from experiments.assembly.film import Film
@@ -88,6 +89,7 @@ class RunningCell:
     def __post_init__(self) -> None:
         self.disturbance = Disturbance.draw(self.config, self.seed)
         self._switch(self.config.simulation.time_step)
+        settle(self.simulation)
 
     @property
     def coarse(self) -> bool:
