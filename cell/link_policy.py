@@ -19,7 +19,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context
 
 from cell.contact.links import ContactLinks
-from cell.contact.memory import Mating
+from cell.contact.memory import Intent
 from cell.contact.plant_side import Pair
 from cell.fixtures.base import Fixture
 from cell.machines.gripper import Gripper
@@ -38,12 +38,12 @@ class Rule:
         kinds: Of the two bodies, in this order.
         meaning: What holds.
         until: The link ends when this changes, or is None; given the policy, the Context of the
-            diagram and the names of the two bodies.
+            diagram, what the present phase intends, and the names of the two bodies.
     """
 
     kinds: tuple[str, str]
     meaning: str
-    until: Callable[[Policy, Context, str, str], object | None]
+    until: Callable[[Policy, Context, Intent, str, str], object | None]
 
 
 @dataclass(frozen=True)
@@ -51,14 +51,14 @@ class Policy:
     """The table, applied to the bodies of one cell.
 
     Attributes:
-        rows: By the numbers of two bodies that may be linked: the rule, and their names in the
-            order of the rule: of the part, of the gripper, of the fixture.
+        rows: By the numbers of two bodies that may be linked: the rules, and their names in the
+            order of the rules: of the part, of the gripper, of the fixture.
         grippers: By name.
         fixture: What holds the first part.
         threads: Of the bolts; None: there are none.
     """
 
-    rows: Mapping[Pair, tuple[Rule, str, str]]
+    rows: Mapping[Pair, tuple[tuple[Rule, ...], str, str]]
     grippers: Mapping[str, Gripper]
     fixture: Fixture
     threads: Threads | None
@@ -88,18 +88,21 @@ class Policy:
         }
         return Policy(rows, by_name, fixture, threads)
 
-    def until(self, root: Context, pair: Pair, mating: Mating) -> object | None:
+    def until(self, root: Context, pair: Pair, intent: Intent) -> object | None:
         """Return what a link between two bodies lasts until the change of; None: no link.
 
         Args:
             root: Context of the diagram.
             pair: Numbers of the bodies.
-            mating: Names of the two parts of each pair that is being mated.
+            intent: Of the present phase.
         """
         if pair not in self.rows:
             return None
-        rule, *names = self.rows[pair]
-        return None if frozenset(names) in mating else rule.until(self, root, *names)
+        rules, *names = self.rows[pair]
+        if frozenset(names) in intent.mating:
+            return None
+        lasting = (rule.until(self, root, intent, *names) for rule in rules)
+        return next((until for until in lasting if until is not None), None)
 
     def limits(
         self, root: Context, A: RigidBody, B: RigidBody, normals_W: NDArray[np.float64]
@@ -119,22 +122,26 @@ class Policy:
 
     # The conditions of the rules.
 
-    def jaw_target(self, root: Context, gripper: str, _: str) -> object:
+    def jaw_target(self, root: Context, _: Intent, gripper: str, __: str) -> object:
         """Return where the jaws are driven to: a link ends when they are told something else."""
         return float(self.grippers[gripper].drive.target(root)[0])
 
-    def fixed(self, root: Context, _: str, __: str) -> object | None:
+    def fixed(self, root: Context, *_: object) -> object | None:
         """Return whether the fixture holds as firmly as it will."""
         return self.fixture.fixed(root) or None
 
-    def always(self, root: Context, _: str, __: str) -> object:
+    def always(self, *_: object) -> object:
         """Return a constant."""
         return True
 
-    def locked(self, root: Context, screw: str, _: str) -> object | None:
+    def locked(self, root: Context, _: Intent, screw: str, __: str) -> object | None:
         """Return whether a bolt is in its thread and held by its friction."""
         assert self.threads is not None
         return self.threads.state(root, screw) is ThreadState.LOCKED or None
+
+    def riding(self, root: Context, intent: Intent, screw: str, _: str) -> object | None:
+        """Return whether a bolt lies loose in a part and touches nothing else."""
+        return "riding" if screw in intent.riding else None
 
 
 TABLE = (
@@ -143,8 +150,9 @@ TABLE = (
     Rule((FIXTURE, PART), "a part in the frozen bed, or on the fixture", Policy.fixed),
     Rule((PART, PART), "parts on their seat, while they are not being mated", Policy.always),
     Rule((SCREW, PART), "the head of a tightened bolt", Policy.locked),
+    Rule((SCREW, PART), "a loose bolt in the part that carries it", Policy.riding),
 )
-RULES = {rule.kinds: rule for rule in TABLE}
+RULES = {kinds: tuple(r for r in TABLE if r.kinds == kinds) for kinds in {r.kinds for r in TABLE}}
 
 
 def add_links(

@@ -27,7 +27,7 @@ from stories import JIG_STORY, QUICK, Player, small_product
 
 from cell import Cell, build_cell
 from cell.contact.links import ContactLinks
-from cell.contact.memory import Mating
+from cell.contact.memory import Intent
 from cell.contact.plant_side import Pair
 from cell.contact.polygons import Polygons
 from cell.contact.springs import Springs, line_wrenches, stiffness_matrix
@@ -86,7 +86,7 @@ class Everything:
 
     limit: float = np.inf
 
-    def until(self, root: Context, pair: Pair, mating: Mating) -> object:
+    def until(self, root: Context, pair: Pair, intent: Intent) -> object:
         return True
 
     def limits(
@@ -321,18 +321,21 @@ def test_policy(linked_cell: Cell) -> None:
     motor, plate, bolt = (cell.parts[name].body for name in ("motor", "plate", "bolt_1"))
     finger = cell.plant.GetBodyByName("finger_left")
     base, table = cell.jig_base.body, cell.plant.world_body()
-    nothing: Mating = frozenset()
+    nothing = Intent()
 
-    def may(A: RigidBody, B: RigidBody, mating: Mating = nothing) -> bool:
-        return policy.until(root, pair_of(A, B), mating) is not None
+    def may(A: RigidBody, B: RigidBody, intent: Intent = nothing) -> bool:
+        return policy.until(root, pair_of(A, B), intent) is not None
 
     assert may(finger, plate)
     assert may(motor, plate)
-    assert not may(motor, plate, frozenset([frozenset(["plate", "motor"])]))
+    assert not may(motor, plate, Intent(mating=frozenset([frozenset(["plate", "motor"])])))
     assert not may(table, motor)
     assert not may(finger, base)
     assert not may(base, motor)  # Soft.
     assert not may(bolt, plate)
+    riding = Intent(riding=frozenset(["bolt_1"]))
+    assert may(bolt, plate, riding)
+    assert not may(bolt, base, riding)
     cell.threads.set(root, "bolt_1", Engagement(ThreadState.LOCKED))
     assert may(bolt, plate)
     before = policy.until(root, pair_of(finger, plate), nothing)

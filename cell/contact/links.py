@@ -11,7 +11,7 @@ far, is given back to Drake.
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any, Protocol
 
@@ -24,7 +24,7 @@ from pydrake.multibody.tree import RigidBody
 from pydrake.systems.framework import Context, LeafSystem
 
 from cell.contact.link import Link
-from cell.contact.memory import Installed, LinksMemory, Mating
+from cell.contact.memory import Installed, Intent, LinksMemory
 from cell.contact.plant_side import SPRINGS, Pair, PlantSide
 
 Array = NDArray[np.float64]
@@ -43,7 +43,7 @@ FEWEST = 4  # Polygons of a contact that resists every displacement.
 class Sticking(Protocol):
     """What says which contacts may be linked: `cell.link_policy`."""
 
-    def until(self, root: Context, pair: Pair, mating: Mating) -> object | None:
+    def until(self, root: Context, pair: Pair, intent: Intent) -> object | None:
         """Return what a link of a pair of bodies lasts until the change of; None: no link."""
         ...
 
@@ -93,17 +93,24 @@ class ContactLinks(LeafSystem):
         """Bring a new Context into its initial state: no link."""
         self._side.switch_all_off(root)
 
-    def keep_full(self, root: Context, mating: Mating) -> None:
-        """Keep the contacts between parts that are being mated full, until the next call.
+    def intend(
+        self,
+        root: Context,
+        mating: frozenset[frozenset[str]] = frozenset(),
+        riding: frozenset[str] = frozenset(),
+    ) -> None:
+        """Take note of what is meant to happen from now on, until the next call.
 
-        Links that a command has ended, to jaws that open, are gone before the next step is taken.
+        Links that this, or a command to jaws, has ended are gone before the next step is taken.
 
         Args:
             root: Of the diagram.
-            mating: Names of the two parts of each pair.
+            mating: As of an `Intent`.
+            riding: As of an `Intent`.
         """
-        if mating != self.memory(root).mating:
-            self._changed(root).mating = mating
+        intent = Intent(mating, riding)
+        if intent != self.memory(root).intent:
+            self._changed(root).intent = intent
         self._end_unwanted(root)
 
     def release(self, root: Context, body: RigidBody) -> None:
@@ -191,7 +198,7 @@ class ContactLinks(LeafSystem):
     def _end_unwanted(self, root: Context) -> None:
         memory = self.memory(root)
         for pair, own in list(memory.installed.items()):
-            if self.policy.until(root, pair, memory.mating) != own.until:
+            if self.policy.until(root, pair, memory.intent) != own.until:
                 self._end(root, pair, "command")
 
     def _check(self, root: Context, *, due: bool) -> None:
@@ -220,7 +227,7 @@ class ContactLinks(LeafSystem):
         memory, context = self._changed(root), self._plant.GetMyContextFromRoot(root)
         seen: dict[Pair, tuple[Array, int]] = {}
         for pair, contacts in self._side.contacts(context).items():
-            until = self.policy.until(root, pair, memory.mating)
+            until = self.policy.until(root, pair, memory.intent)
             # Drake 1.58 crashes with the world as a body of a distance constraint.
             if until is None or pair in memory.installed or 0 in pair:
                 continue
@@ -304,7 +311,8 @@ class ContactLinks(LeafSystem):
                 for pair, (pose, since) in memory.watched.items()
             },
             "returns": {name(pair): np.array(count) for pair, count in memory.returns.items()},
-            "mating": np.array(sorted("|".join(sorted(pair)) for pair in memory.mating), dtype=str),
+            "mating": _names("|".join(sorted(pair)) for pair in memory.intent.mating),
+            "riding": _names(memory.intent.riding),
             "counts": np.array([memory.steps, memory.made]),
             "time": np.array(memory.time),
             "linked": {name(pair): np.array(time) for pair, time in memory.linked.items()},
@@ -323,14 +331,17 @@ class ContactLinks(LeafSystem):
         watched, returns = state.get("watched", {}), state.get("returns", {})
         memory.watched = {pair_of(n): (w["pose"], int(w["since"])) for n, w in watched.items()}
         memory.returns = {pair_of(name): int(count) for name, count in returns.items()}
-        memory.mating = frozenset(frozenset(str(pair).split("|")) for pair in state["mating"])
+        memory.intent = Intent(
+            mating=frozenset(frozenset(str(pair).split("|")) for pair in state["mating"]),
+            riding=frozenset(map(str, state["riding"])),
+        )
         memory.steps, memory.made = map(int, state["counts"])
         memory.time = float(state["time"])
         memory.linked = {pair_of(n): float(time) for n, time in state.get("linked", {}).items()}
         memory.ended = Counter({n: int(count) for n, count in state.get("ended", {}).items()})
         for name, arrays in state.get("links", {}).items():
             pair = pair_of(name)
-            until = self.policy.until(root, pair, memory.mating)
+            until = self.policy.until(root, pair, memory.intent)
             own = Installed(
                 link=Link.from_arrays(arrays),
                 slots=tuple(map(int, arrays["slots"])),
@@ -339,6 +350,10 @@ class ContactLinks(LeafSystem):
                 sleepers=frozenset(map(int, arrays["sleepers"])),
             )
             self._install(root, pair, own)
+
+
+def _names(names: Iterable[str]) -> NDArray[np.str_]:
+    return np.array(sorted(names), dtype=str)
 
 
 def _way(then: Array, now: Array) -> float:

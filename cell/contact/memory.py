@@ -13,7 +13,19 @@ from cell.contact.link import Link
 from cell.contact.plant_side import Pair
 
 Array = NDArray[np.float64]
-Mating = frozenset[frozenset[str]]  # Names of the two parts of each pair.
+
+
+@dataclass(frozen=True)
+class Intent:
+    """What a phase means to happen between bodies.
+
+    Attributes:
+        mating: Names of the two parts of each pair that is being mated: their contact stays full.
+        riding: Names of loose bolts that nothing but the part in which they lie touches.
+    """
+
+    mating: frozenset[frozenset[str]] = frozenset()
+    riding: frozenset[str] = frozenset()
 
 
 @dataclass(frozen=True)
@@ -44,7 +56,7 @@ class LinksMemory:
         installed: By pair of bodies.
         watched: Contacts that may be linked: relative pose (3, 4) and step since when it holds.
         returns: How often each pair has got its full contact back by a check.
-        mating: Pairs of parts whose contact stays full.
+        intent: Of the present phase.
         steps: Since the beginning.
         time: Since the beginning [s].
         linked: For how long each pair has been linked [s].
@@ -55,7 +67,7 @@ class LinksMemory:
     installed: dict[Pair, Installed] = field(default_factory=dict)
     watched: dict[Pair, tuple[Array, int]] = field(default_factory=dict)
     returns: dict[Pair, int] = field(default_factory=dict)
-    mating: Mating = frozenset()
+    intent: Intent = Intent()
     steps: int = 0
     time: float = 0.0
     linked: dict[Pair, float] = field(default_factory=dict)

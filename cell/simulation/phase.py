@@ -216,6 +216,8 @@ class Phase:
         awake: Names of the parts that are awake during the phase.
         mating: Names of the two parts of each pair that is being mated: their contact is computed
             in full.
+        riding: Names of bolts that lie loose in a part that is carried or set down and touch
+            nothing else: while they stick to it, they may be linked.
         fine_log: Log every step.
         tare: Whether the wrists read zero at the start; not in a phase that begins under load.
     """
@@ -230,6 +232,7 @@ class Phase:
     every_step: Event | None = None
     awake: frozenset[str] = frozenset()
     mating: frozenset[frozenset[str]] = frozenset()
+    riding: frozenset[str] = frozenset()
     fine_log: bool = False
     tare: bool = True
 

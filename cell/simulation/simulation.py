@@ -132,7 +132,7 @@ class Simulation:
         for event in phase.start:
             event(self)
         run = _PhaseRun(self, phase)
-        self.cell.links.keep_full(self.root, phase.mating)
+        self.cell.links.intend(self.root, phase.mating, phase.riding)
         while True:
             run.command()
             try:

@@ -202,7 +202,7 @@ def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[P
 
     The pose in the hand is looked at, not assumed: the part may have slipped in the grip.
     """
-    arm, awake = station.holder, frozenset(station.in_hand)
+    arm, awake, riding = station.holder, frozenset(station.in_hand), frozenset(station.riders)
     up = raised(station.tool_pose(arm, reach.grasp.jaw), height)
     guard = lost_grasp(station)
     yield Phase(
@@ -215,10 +215,17 @@ def lift(station: Station, part: str, reach: Reach, height: float) -> Iterator[P
         },
         guard=guard,
         awake=awake,
+        riding=riding,
     )
     in_hand = station.pose_of(part)
     yield from look(
-        station, HandPhase.LOOK_IN_HAND, part, station.in_hand, awake=awake, guard=guard
+        station,
+        HandPhase.LOOK_IN_HAND,
+        part,
+        station.in_hand,
+        awake=awake,
+        guard=guard,
+        riding=riding,
     )
     check_lifted(part, in_hand, station.pose_of(part))
 
@@ -243,7 +250,12 @@ def check_lifted(part: str, in_hand: RigidTransform, seen: RigidTransform) -> No
 
 
 def let_go(
-    station: Station, part: str, grasp: Grasp, retreat: float, awake: frozenset[str]
+    station: Station,
+    part: str,
+    grasp: Grasp,
+    retreat: float,
+    awake: frozenset[str],
+    riding: frozenset[str] = frozenset(),
 ) -> Iterator[Phase]:
     """Yield the phases that open the jaws and back the hand off straight.
 
@@ -253,6 +265,7 @@ def let_go(
         grasp: How it is held.
         retreat: How far the hand backs off [m].
         awake: Names of the parts that are awake until the jaws are clear.
+        riding: As of a phase.
     """
     arm, gripper = station.holder, station.cell.gripper
     yield Phase(
@@ -262,6 +275,7 @@ def let_go(
         subject=part,
         commands={gripper.name: opened(gripper.model, grasp)},
         awake=awake,
+        riding=riding,
     )
     station.put_down()
     X_WJaw = station.tool_pose(arm, grasp.jaw)
@@ -277,6 +291,7 @@ def let_go(
             subject=part,
             commands={arm.name: line},
             awake=stay,
+            riding=riding & stay,
         )
 
 

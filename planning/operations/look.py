@@ -19,6 +19,7 @@ def look(
     start: tuple[Event, ...] = (),
     awake: frozenset[str] = frozenset(),
     guard: Guard | None = None,
+    riding: frozenset[str] = frozenset(),
 ) -> Iterator[Phase]:
     """Yield the phase of a look, and refresh the belief at its end.
 
@@ -33,6 +34,7 @@ def look(
         start: Events at the start.
         awake: Names of the parts that are awake.
         guard: As of a phase.
+        riding: As of a phase.
     """
     duration = max(settle, station.source.duration)
     if duration > 0.0 or start:
@@ -44,5 +46,6 @@ def look(
             guard=guard,
             start=start,
             awake=awake,
+            riding=riding,
         )
     station.look(*parts)

@@ -100,7 +100,8 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     their threads, and their heads stay behind as the part sinks to its seat.
     """
     arm, part = station.holder, mating.part
-    held = frozenset([part, *riders])
+    riding = frozenset(riders)
+    held = riding | {part}
     # What bears the part that it comes to has to be there, too: nothing stands on what sleeps.
     both = held | {mating.on, *station.fixed}
     yield from look(station, MatePhase.LOOK, part)
@@ -118,10 +119,19 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
         commands={arm.name: station.move(arm, q_above)},
         guard=holding,
         awake=held,
+        riding=riding,
     )
     # Once more with the part over its place: it may have turned in the grip on the way.
     seen = (*station.in_hand, mating.on)
-    yield from look(station, MatePhase.LOOK_OVER_SHAFT, part, seen, awake=held, guard=holding)
+    yield from look(
+        station,
+        MatePhase.LOOK_OVER_SHAFT,
+        part,
+        seen,
+        awake=held,
+        guard=holding,
+        riding=riding,
+    )
     X_JawP, X_WGoal = jaw_to_part(station, part, reach.grasp), goal_pose(station, mating)
     near = raised(X_WGoal, mating.depth + NEAR) @ X_JawP.inverse()
     yield Phase(
@@ -132,10 +142,17 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
         commands={arm.name: station.line(arm, jaw, near)},
         guard=holding,
         awake=held,
+        riding=riding,
     )
     # The wrist is tared at rest.
     yield Phase(
-        MatePhase.HOVER, steady_wrist(arm.name), 1.0, subject=part, guard=holding, awake=held
+        MatePhase.HOVER,
+        steady_wrist(arm.name),
+        timeout=1.0,
+        subject=part,
+        guard=holding,
+        awake=held,
+        riding=riding,
     )
     yield from _insert(station, mating, X_WGoal, jaw, X_JawP, both)
     yield from let_go(station, part, reach.grasp, RETREAT, both)

@@ -95,6 +95,7 @@ class Transcript:
                     **{name: to_data(getattr(phase, name)) for name in WORDS},
                     "awake": sorted(phase.awake),
                     "mating": sorted(sorted(pair) for pair in phase.mating),
+                    "riding": sorted(phase.riding),
                     "commands": {d: self._number(c) for d, c in phase.commands.items()},
                     "in_hand": list(station.in_hand),
                 }
@@ -193,6 +194,7 @@ class Program:
             **words,
             awake=frozenset(data["awake"]),
             mating=frozenset(frozenset(pair) for pair in data["mating"]),
+            riding=frozenset(data["riding"]),
             commands={d: self._command(row, station) for d, row in data["commands"].items()},
         )
 

@@ -58,7 +58,8 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     """Yield the phases that take a part off the fixture and put it back into the tray."""
     ((part,), riders) = step.parts, step.riders
     arm = station.holder
-    X_WGoal, awake = station.origins[part], frozenset([part, *riders])
+    X_WGoal, riding = station.origins[part], frozenset(riders)
+    awake = riding | {part}
     yield from look(station, AsidePhase.LOOK, part)
     reach = first(_useful(station, part, X_WGoal), part, station)
     yield from seize(station, part, reach, riders)
@@ -85,10 +86,17 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         guard=holding,
         start=(release_part(part),),
         awake=awake,
+        riding=riding,
     )
     # Once more with the part over its place: it may have turned in the grip on the way.
     yield from look(
-        station, AsidePhase.LOOK_OVER_PLACE, part, station.in_hand, awake=awake, guard=holding
+        station,
+        AsidePhase.LOOK_OVER_PLACE,
+        part,
+        station.in_hand,
+        awake=awake,
+        guard=holding,
+        riding=riding,
     )
     X_PJaw = jaw_to_part(station, part, reach.grasp).inverse()
     near, under = raised(X_WGoal, LANDING) @ X_PJaw, raised(X_WGoal, -BELOW) @ X_PJaw
@@ -100,6 +108,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         commands={arm.name: station.line(arm, jaw, near)},
         guard=holding,
         awake=awake,
+        riding=riding,
     )
     yield Phase(
         AsidePhase.SET_DOWN,
@@ -109,9 +118,17 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         commands={arm.name: station.line(arm, jaw, under, speed=SLOW, felt=TOUCH_FORCE)},
         guard=holding,
         awake=awake,
+        riding=riding,
     )
-    yield from let_go(station, part, reach.grasp, RETREAT, awake)
-    yield Phase(AsidePhase.SETTLE, after(SETTLE_TIME), timeout=1.0, subject=part, awake=awake)
+    yield from let_go(station, part, reach.grasp, RETREAT, awake, riding)
+    yield Phase(
+        AsidePhase.SETTLE,
+        after(SETTLE_TIME),
+        timeout=1.0,
+        subject=part,
+        awake=awake,
+        riding=riding,
+    )
 
 
 def _useful(station: Station, part: str, X_WGoal: RigidTransform) -> Iterator[Reach]:
