@@ -201,8 +201,12 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     config = station.config
     tip, screw = driver.frame("tool_tip"), station.cell.product.screws[bolt]
     awake = _awake(station, bolt)
-    # What the bolt clamps together slips into place meanwhile.
-    mating = frozenset([frozenset([screw.into, screw.clamps])])
+    # What the bolt clamps together slips into place meanwhile. Once another bolt clamps it, it does
+    # so under the torque only: it stays on its seat while this one is run down.
+    seat = frozenset([screw.into, screw.clamps])
+    mating = frozenset([seat])
+    driven = [station.cell.product.screws[name] for name in station.driven]
+    clamped = any(seat == {other.into, other.clamps} for other in driven)
 
     yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
     holding = _holding(station)
@@ -251,7 +255,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         subject=bolt,
         commands={driver.name: feed, spindle: Spin(config.driver.free_speed)},
         awake=awake,
-        mating=mating,
+        mating=frozenset() if clamped else mating,
     )
     station.driven += (bolt,)
     yield Phase(
