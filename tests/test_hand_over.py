@@ -22,6 +22,7 @@ from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.operation import Operation, Step
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.place_bolts import PLACE_BOLTS
+from planning.operations.set_aside import SET_ASIDE
 from planning.operations.station import Station
 from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 
@@ -41,6 +42,7 @@ def test_operations_that_allow_it_are_stepped_coarsely(running: RunningCell) -> 
         (PICK_PLACE, 1),
         (INSERT_SHAFT, 2),
         (PLACE_BOLTS, 2),
+        (SET_ASIDE, 2),
         (TIGHTEN_BOLTS, 1),
     ):
         running.switch(operation)

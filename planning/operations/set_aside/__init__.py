@@ -18,5 +18,6 @@ SET_ASIDE = Operation(
     measure=measure,
     limits=LIMITS,
     role=Role.REMOVE,
+    coarse=True,
     plan=plan,
 )

@@ -34,7 +34,7 @@ from planning.operations.station import Station
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the place [m] [A].
 LANDING = 0.003  # Slow from this far above the place on [m] [A].
-SLOW = 0.01  # [m/s] [A]
+SLOW = 0.005  # 0.01 mm a coarse step, by which the touch is felt too late [m/s] [A].
 BELOW = 0.001  # The hand sinks at most this far below where the part stood before [m] [A].
 TOUCH_FORCE = 3.0  # The part stands when it pushes back this hard [N] [A].
 RETREAT = 0.08
