@@ -92,7 +92,8 @@ class Keeper:
 
     def _keep(self) -> None:
         self.state = resumable_state(self.run)
-        write_arrays(self.job.out / STATE, self.state)
+        # Replaced after the next step: not worth the time to compress it.
+        write_arrays(self.job.out / STATE, self.state, compressed=False)
         self.result.update(state=STATE, **_course(self.run))
 
     def finish(self, pictures: Pictures) -> None:
