@@ -132,12 +132,12 @@ def run() -> Run:
 
 
 def test_planner_does_not_know_the_disturbance(run: Run) -> None:
-    """Parts are where the tray really is; the planner keeps the tray's nominal pose."""
+    """Parts rest where the tray really is; the planner keeps the tray's nominal pose."""
     X_WT = Disturbance.draw(CONFIG, 0).applied_to(CONFIG).workcell.X_WT
     part = PRODUCT.parts["motor"]
     assert part.X_TrayP is not None
     run.station.look()
-    assert run.station.pose_of("motor").IsNearlyEqualTo(X_WT @ part.X_TrayP, 1e-9)
+    assert run.station.pose_of("motor").IsNearlyEqualTo(X_WT @ part.X_TrayP, 1e-5)
     assert run.station.config == CONFIG
     assert run.running.disturbance == Disturbance.draw(CONFIG, 0)
 

@@ -160,10 +160,10 @@ def test_full_disk_leaves_the_former_results(whole: Path, tmp_path: Path) -> Non
 
 @pytest.fixture
 def disk(tmp_path: Path) -> Iterator[Path]:
-    """Return the mount point of a disk of 64 kB, if this user may mount one."""
+    """Return the mount point of a disk of 800 kB, if this user may mount one."""
     point = tmp_path / "disk"
     point.mkdir()
-    options = ["-t", "tmpfs", "-o", "size=64k", "tmpfs"]
+    options = ["-t", "tmpfs", "-o", "size=800k", "tmpfs"]
     mount = shutil.which("mount")
     if mount is None or os.geteuid() != 0 or subprocess.call([mount, *options, str(point)]) != 0:
         pytest.skip("no disk can be mounted here")
