@@ -13,6 +13,7 @@ The folders are what the scripts share, from the lowest up:
 - `paper`: its experiments, ``soft-jig place`` and ``push``.
 - `compare`: what differs between two results beyond its tolerance, ``soft-jig compare``.
 - `regress`: experiments against stored metrics, ``soft-jig regress``.
+- `studies`: what `pose_error_study`, `jig_design_study` and `product_variants` share.
 - `cli`: the command line.
 
 A test keeps their imports pointing down.

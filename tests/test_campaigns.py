@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -11,6 +12,8 @@ import pytest
 
 from cell import CellConfig
 from cell.errors import InputError
+from cell.paths import model_folder
+from cell.products.loading import PRODUCTS
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.catalogue import BUILT_IN, experiment_named, name_of
 from experiments.campaigns.points import combined, grid, parse_grid, parse_sample, sample, trials
@@ -64,6 +67,31 @@ def test_changed_script_is_another_trial(tmp_path: Path) -> None:
         )
         keys.append(trials(f"{script}:own")[0].key)
     assert keys[0] != keys[1]
+
+
+def test_anything_that_a_product_file_says_is_part_of_the_key(tmp_path: Path) -> None:
+    """Grip force, order, tolerance, a model's own files: none may be taken for a former trial."""
+    text = (PRODUCTS / "idler.yaml").read_text()
+    model = tmp_path / "models" / "idler_post" / "idler_post.sdf"
+    shutil.copytree(model_folder("idler_post"), model.parent)
+
+    def key(number: int, old: str = "", new: str = "") -> str:
+        file = tmp_path / f"{number}.yaml"
+        file.write_text(text.replace(old, new, 1) if old else text)
+        assert not old or old in text
+        return trials(experiments.tiny, product=str(file))[0].key
+
+    keys = [
+        key(0),
+        key(1, "force_N: 40", "force_N: 30"),
+        key(2, "width_mm: 34", "width_mm: 33"),
+        key(3, "  - [post, arm, bolts]\n  - [arm, bolts, post]", "  - [arm, bolts, post]"),
+        key(4, "contact_tolerance_mm: 0.05", "contact_tolerance_mm: 0.06"),
+        key(5, "at_mm: [0, 0, -10]", "at_mm: [0, 0, -11]"),
+    ]
+    model.write_text(model.read_text() + "<!-- changed -->\n")
+    keys.append(key(6))
+    assert len(set(keys)) == len(keys)
 
 
 def test_what_is_listed_twice_is_one_trial() -> None:

@@ -4,9 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from pydrake.geometry import Cylinder
 from pydrake.math import RigidTransform
 
 from cell import Cell, CellConfig, build_cell, load_product
+from cell.fixtures.jig_dimensions import BASE_DIAMETER
+from cell.fixtures.soft_jig.parameters import BadJig
 from cell.simulation.simulation import Simulation
 from planning.operations.stroke import Stroke
 
@@ -70,6 +73,38 @@ def test_a_bolted_base_neither_sleeps_nor_moves() -> None:
     cell.jig_base.sleep(simulation.root)
     assert not cell.jig_base.asleep(simulation.root)
     assert cell.jig_base.X_WJ(simulation.context).IsNearlyEqualTo(cell.X_WJ, 1e-12)
+
+
+def test_base_is_as_wide_as_its_bag_needs_and_carries_its_beads() -> None:
+    """Half as wide again: the same rim beside the bag, in proportion; heavier beads sit above."""
+    wide = {"jig.bag.cap_radius": 0.09, "jig.bag.cap_height": 1.5 * 0.0459}
+    full = {**wide, "jig.bag.bead_volume": 1.5**3 * 180e-6, "push.jig_mass": 4.0}
+    found = {}
+    for name, changes in (("usual", {}), ("wide", full)):
+        config = CellConfig().with_changes({"workcell.jig_base_fixed": False, **changes})
+        product = replace(load_product("motor_unit"), parts={}, joints=(), groups={})
+        cell = build_cell(config, product)
+        inspector = cell.scene_graph.model_inspector()
+        geometries = cell.plant.GetCollisionGeometriesForBody(cell.jig_base.body)
+        (shape,) = (s for g in geometries if isinstance(s := inspector.GetShape(g), Cylinder))
+        simulation = Simulation(cell)
+        inertia = cell.jig_base.body.CalcSpatialInertiaInBodyFrame(simulation.context)
+        found[name] = shape.radius(), inertia
+    assert found["usual"][0] == BASE_DIAMETER / 2
+    assert found["wide"][0] == pytest.approx(1.5 * BASE_DIAMETER / 2)
+    beads, base = 1.5**3 * 0.45, 4.0 - 1.5**3 * 0.45
+    height = (beads * 0.4 * 1.5 * 0.0459 - base * 0.0125) / 4.0
+    assert found["wide"][1].get_mass() == pytest.approx(4.0)
+    assert found["wide"][1].get_com()[2] == pytest.approx(height)
+
+
+def test_jig_lighter_than_its_beads_is_refused() -> None:
+    config = CellConfig().with_changes(
+        {"workcell.jig_base_fixed": False, "jig.bag.bead_volume": 1e-3}
+    )
+    product = replace(load_product("motor_unit"), parts={}, joints=(), groups={})
+    with pytest.raises(BadJig, match="push.jig_mass.*beads alone 2.5 kg"):
+        Simulation(build_cell(config, product))
 
 
 def test_a_short_stroke_never_reaches_its_speed() -> None:

@@ -63,6 +63,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "paper": {"reporting", "campaigns", "speed"},
         "compare": {"reporting", "campaigns"},
         "regress": {"reporting", "campaigns", "speed", "jig", "paper", "compare"},
+        "studies": {"reporting", "assembly", "campaigns", "product", "paper", "compare"},
         "cli": {
             "reporting", "plan", "assembly", "campaigns", "product", "paper", "compare", "regress",
         },

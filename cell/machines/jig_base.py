@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import ProximityProperties, RoleAssign, SceneGraph
+from pydrake.geometry import Cylinder, ProximityProperties, RoleAssign, SceneGraph
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -14,6 +14,7 @@ from pydrake.systems.framework import Context
 
 from cell.configuration.config import CellConfig
 from cell.fixtures.jig_dimensions import BASE_DIAMETER, BASE_HEIGHT, BEAD_MASS
+from cell.fixtures.soft_jig.parameters import BadJig, BagParameters
 from cell.sleep import Sleep
 
 
@@ -73,17 +74,55 @@ class JigBase:
             self.sleeper.wake(root, self.body, apart_from=[self.plate])
 
 
+def bead_mass(bag: BagParameters) -> float:
+    """Return the mass of the beads in a bag [kg]; the paper's 450 g are those of its own [S]."""
+    return BEAD_MASS * (bag.bead_volume / BagParameters().bead_volume)
+
+
+def base_scale(bag: BagParameters) -> float:
+    """Return how much wider than the paper's base one is that is made for a bag."""
+    return bag.aperture_radius / BagParameters().aperture_radius
+
+
 def _inertia(config: CellConfig) -> SpatialInertia:
-    """Return base and beads about J: a disc below it and a ball of the same volume above."""
-    mass, up = config.push.jig_mass - BEAD_MASS, np.array([0.0, 0.0, 1.0])
-    disc = SpatialInertia.SolidCylinderWithMass(mass, BASE_DIAMETER / 2, BASE_HEIGHT, up)
+    """Return base and beads about J: a disc below it and a ball of the same volume above.
+
+    Raises:
+        BadJig: The jig is not heavier than its beads.
+    """
+    bag, up = config.jig.bag, np.array([0.0, 0.0, 1.0])
+    beads = bead_mass(bag)
+    mass = config.push.jig_mass - beads
+    if mass <= 0.0:
+        raise BadJig(
+            f"The jig weighs {config.push.jig_mass:g} kg (push.jig_mass), its beads alone "
+            f"{beads:.3g} kg (jig.bag.bead_volume)."
+        )
+    width = base_scale(bag) * BASE_DIAMETER
+    disc = SpatialInertia.SolidCylinderWithMass(mass, width / 2, BASE_HEIGHT, up)
     base = disc.Shift(0.5 * BASE_HEIGHT * up)
-    bag = config.jig.bag
     radius = (0.75 * bag.volume / np.pi) ** (1 / 3)
     p_JB = np.array([0.0, 0.0, 0.4 * bag.cap_height])  # Centroid of the cap, nearly [D].
     unit = UnitInertia.SolidSphere(radius).ShiftFromCenterOfMass(-p_JB)
-    base += SpatialInertia(BEAD_MASS, p_JB, unit)
+    base += SpatialInertia(beads, p_JB, unit)
     return base
+
+
+def fit_to_bag(
+    plant: MultibodyPlant, scene_graph: SceneGraph, base: RigidBody, bag: BagParameters
+) -> None:
+    """Make the base as wide as a bag of another size needs, before the plant is finalized.
+
+    What touches the force plate is changed, not what is seen: pictures show the paper's base.
+    """
+    scale, inspector = base_scale(bag), scene_graph.model_inspector()
+    if scale == 1.0:
+        return
+    for geometry in plant.GetCollisionGeometriesForBody(base):
+        disc = inspector.GetShape(geometry)
+        assert isinstance(disc, Cylinder)
+        wider = Cylinder(scale * disc.radius(), disc.length())
+        scene_graph.ChangeShape(plant.get_source_id(), geometry, wider)
 
 
 def set_sliding_friction(

@@ -12,7 +12,7 @@ from typing import Any
 import cell
 import planning
 from cell.configuration.config import CellConfig
-from cell.paths import MODELS
+from cell.paths import FILE_URL, MODELS
 from cell.products.loading import load_product
 from cell.simulation.identity import product_digest
 from experiments.reporting.provenance import versions
@@ -30,7 +30,7 @@ def code_digest(script: Path) -> str:
             seen.
     """
     packages = [Path(package.__file__ or "").parent for package in (cell, planning)]
-    parts = [EXPERIMENTS / name for name in ("assembly", "jig", "paper")]
+    parts = [EXPERIMENTS / name for name in ("assembly", "jig", "paper", "product")]
     digest = hashlib.sha256(repr(sorted(versions().items())).encode())
     for folder in (*packages, *parts):
         _add_files(digest, folder, folder.rglob("*.py"))
@@ -48,12 +48,28 @@ def _add_files(digest: Any, base: Path, files: Iterable[Path]) -> None:
 
 @cache
 def content_of(product: str) -> str:
-    """Return a digest of a product's parts, meshes and joints.
+    """Return a digest of all that a product's file says, and of the models of its own.
 
     Raises:
         InputError: It cannot be read.
     """
-    return product_digest(load_product(product))
+    found = load_product(product)
+    digest = hashlib.sha256(product_digest(found).encode())
+    for part in found.parts.values():
+        for grasp in part.grasps:
+            text = f"{part.name} {grasp.name} {grasp.jaw} {grasp.width} {grasp.force}"
+            digest.update(text.encode() + grasp.X_PJaw.GetAsMatrix34().tobytes())
+    declared = [
+        sorted(map(sorted, getattr(found.declared, k))) for k in ("accept", "press", "snap")
+    ]
+    declared += [sorted(found.declared.flexible), found.declared.accept_all]
+    rest = [sorted(found.groups.items()), found.orders, found.up, found.contact_tolerance, declared]
+    digest.update(repr(rest).encode())
+    models = [found.tray or "", *(part.model or "" for part in found.parts.values())]
+    for url in sorted({model for model in models if model.startswith(FILE_URL)}):
+        folder = Path(url.removeprefix(FILE_URL)).parent
+        _add_files(digest, folder, folder.rglob("*.*"))
+    return digest.hexdigest()
 
 
 def trial_key(

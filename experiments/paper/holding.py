@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -22,8 +22,9 @@ RATE, MOST = 20.0, 40.0  # Of a force [N/s], [N]; faster ramps overstate holding
 TURN_RATE, TURN_MOST = 0.5, 1.5  # Of a moment [N m/s], [N m].
 AWAY, TURNED = 1e-3, np.deg2rad(2.0)  # At which the part no longer counts as held [m], [rad].
 
-FORCES = ("+x", "-x", "+y", "-y", "+z")  # In J; a pull up is +z.
-MOMENTS = ("x", "y", "z")
+SIDEWAYS = tuple(f"force {way}" for way in ("+x", "-x", "+y", "-y"))  # In J.
+LIFT = "force +z"
+LOADS = (*SIDEWAYS, LIFT, "moment x", "moment y", "moment z")
 
 
 @dataclass(frozen=True)
@@ -39,22 +40,23 @@ class Held:
     moved: bool
 
 
-def holding(simulation: RigSimulation) -> Mapping[str, Held]:
+def holding(simulation: RigSimulation, loads: Sequence[str] = LOADS) -> Mapping[str, Held]:
     """Return what the placed part bears at its mass centre, by direction: "force +x", "moment z".
 
     Each pull starts from the same state, a copy of the simulation's; the simulation is not changed.
 
     Args:
         simulation: Of a rig whose hand has let go and is away.
+        loads: Those of `LOADS` that are wanted.
     """
     found = {}
-    for name in FORCES:
-        axis = np.eye(3)["xyz".index(name[1])] * (1.0 if name[0] == "+" else -1.0)
-        found[f"force {name}"] = _pull(simulation, np.zeros(3), RATE * axis, MOST / RATE)
-    for name in MOMENTS:
-        axis = np.eye(3)["xyz".index(name)]
-        way = TURN_MOST / TURN_RATE
-        found[f"moment {name}"] = _pull(simulation, TURN_RATE * axis, np.zeros(3), way)
+    for load in loads:
+        kind, way = load.split()
+        axis = np.eye(3)["xyz".index(way[-1])] * (-1.0 if way[0] == "-" else 1.0)
+        if kind == "force":
+            found[load] = _pull(simulation, np.zeros(3), RATE * axis, MOST / RATE)
+        else:
+            found[load] = _pull(simulation, TURN_RATE * axis, np.zeros(3), TURN_MOST / TURN_RATE)
     return found
 
 

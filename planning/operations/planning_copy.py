@@ -12,6 +12,7 @@ from cell.builder import Cell
 from cell.configuration.config import CellConfig
 from cell.machines.arm import Arm
 from cell.machines.devices import add_arms, make_drives
+from cell.machines.jig_base import fit_to_bag
 from cell.machines.workcell import add_workcell
 from cell.workpieces.parts import add_parts
 from planning.motion.collision_model import CollisionModel
@@ -27,6 +28,7 @@ def collision_model(cell: Cell, config: CellConfig) -> CollisionModel:
 
     def populate(plant: MultibodyPlant, scene_graph: SceneGraph) -> Mapping[str, Arm]:
         workcell = add_workcell(plant, config, cell.product.tray)
+        fit_to_bag(plant, scene_graph, workcell.base, config.jig.bag)
         plant.RegisterCollisionGeometry(
             workcell.base,
             RigidTransform(),

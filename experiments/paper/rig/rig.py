@@ -31,7 +31,7 @@ from cell.link_policy import add_links
 from cell.machines.drive import JointDrive
 from cell.machines.gripper import Gripper, GripperDrive
 from cell.machines.grippers import HAND_E
-from cell.machines.jig_base import JigBase, set_sliding_friction
+from cell.machines.jig_base import JigBase, fit_to_bag, set_sliding_friction
 from cell.machines.sensors import WrenchSensor
 from cell.machines.workcell import add_workcell
 from cell.monitor import Monitor, StepCounter
@@ -155,6 +155,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     jaws = builder.AddNamedSystem("gripper_drive", GripperDrive(HAND_E))
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
     workcell = add_workcell(plant, config, tray=None)
+    fit_to_bag(plant, scene_graph, workcell.base, config.jig.bag)
     for sliding in (workcell.plate, workcell.base):
         set_sliding_friction(plant, scene_graph, sliding, config.push.base_friction)
     alone = replace(product, parts={part: product.parts[part]}, joints=())
