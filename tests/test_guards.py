@@ -17,6 +17,7 @@ from cell.machines.gripper import GripperReading
 from cell.simulation.conditions import All, Below, Height, PushesBack, Signal, Steady, WristForce
 from cell.simulation.phase import (
     Follow,
+    Jaw,
     Phase,
     PhaseFailed,
     after,
@@ -32,7 +33,7 @@ from planning.operations.sequence import steps
 from planning.operations.tighten_bolts.phases import Clutch
 
 ORDER = ("plate", "bolts", "motor")  # Every operation of an assembly has a step in it.
-Seen = list[tuple[str, Phase, tuple[str, ...]]]
+Seen = list[tuple[str, Phase, tuple[str, ...], float]]
 
 
 class Kind(Enum):
@@ -48,18 +49,23 @@ def running() -> RunningCell:
 
 @pytest.fixture(scope="module")
 def seen(running: RunningCell) -> Seen:
-    """Return every phase of a whole assembly, with its operation and what is in the hand."""
-    product = running.product
-    todo = steps(product, plan(product, ORDER))
-    return [
-        (step.operation.name, phase, hand)
-        for step in todo
-        for phase, hand in phases_of(running, [step])
-    ]
+    """Return every phase of a whole assembly.
+
+    With it come its operation, what is in the hand, and the opening of the jaws during it.
+    """
+    product, gripper = running.product, running.simulation.cell.gripper.name
+    todo, found = steps(product, plan(product, ORDER)), []
+    for step in todo:
+        for phase, hand in phases_of(running, [step]):
+            jaw = phase.commands.get(gripper)
+            now = sensed_in(running).grippers[gripper].opening
+            opening = jaw.opening if isinstance(jaw, Jaw) else now
+            found.append((step.operation.name, phase, hand, opening))
+    return found
 
 
 def test_every_operation_of_an_assembly_is_there(seen: Seen) -> None:
-    assert {name for name, _, _ in seen} == {
+    assert {name for name, *_ in seen} == {
         "pick_place",
         "place_loose_bolts",
         "set_aside",
@@ -68,11 +74,11 @@ def test_every_operation_of_an_assembly_is_there(seen: Seen) -> None:
     }
 
 
-def held(seen: Seen) -> Iterator[tuple[str, Phase]]:
-    """Yield each phase through which a part has to stay in the grip."""
-    for _, phase, hand in seen:
+def held(seen: Seen) -> Iterator[tuple[str, Phase, float]]:
+    """Yield each phase through which a part has to stay in the grip, with the jaws' opening."""
+    for _, phase, hand, opening in seen:
         if (hand and phase.kind is not HandPhase.RELEASE) or phase.kind is HandPhase.GRIP:
-            yield phase.name, phase
+            yield phase.name, phase, opening
 
 
 def test_grip_is_watched_from_the_grip_to_the_release_in_every_operation(
@@ -80,13 +86,8 @@ def test_grip_is_watched_from_the_grip_to_the_release_in_every_operation(
 ) -> None:
     """Jaws that close further than on the part have lost it; an elastic tenth of that is none."""
     gripper, watched = running.simulation.cell.gripper.name, 0
-    for name, phase in held(seen):
+    for name, phase, at_grip in held(seen):
         assert phase.guard is not None, name
-        at_grip = next(
-            guard.least + LOST  # type: ignore[attr-defined]
-            for guard in getattr(phase.guard, "guards", (phase.guard,))
-            if hasattr(guard, "least")
-        )
         for closer, lost in ((0.1 * LOST, False), (1.1 * LOST, True)):
             grippers = {gripper: GripperReading(at_grip - closer, 0.0)}
             evidence = phase.guard(sensed_in(running, grippers=grippers))
@@ -99,7 +100,7 @@ def test_grip_is_watched_from_the_grip_to_the_release_in_every_operation(
 
 
 def test_force_is_watched_while_the_hand_is_soft(seen: Seen, running: RunningCell) -> None:
-    soft = [phase for _, phase, _ in seen if phase.kind in SOFT]
+    soft = [phase for _, phase, *_ in seen if phase.kind in SOFT]
     assert len(soft) >= 2
     arm, gripper = running.simulation.cell.holder.name, running.simulation.cell.gripper.name
     for phase in soft:
@@ -112,7 +113,7 @@ def test_force_is_watched_while_the_hand_is_soft(seen: Seen, running: RunningCel
 
 
 def test_every_phase_ends_in_time(seen: Seen) -> None:
-    for _, phase, _ in seen:
+    for _, phase, *_ in seen:
         assert 0.0 < phase.timeout < 60.0
         motions = [c for c in phase.commands.values() if isinstance(c, JointMotion)]
         assert all(motion.duration < phase.timeout for motion in motions), phase.name
@@ -149,12 +150,34 @@ def test_what_a_condition_waits_for_is_said(running: RunningCell) -> None:
         assert what_is_missing(condition, sensed) == words
 
 
+def test_tool_is_pushed_back_by_a_force_that_points_up(running: RunningCell) -> None:
+    for force, holds in ((19.9, False), (20.1, True), (-20.1, False)):
+        felt = {"left": np.array([0.0, 0.0, 50.0, 50.0, 50.0, force])}
+        assert PushesBack("left", 20.0)(sensed_in(running, wrench=felt)) == holds
+
+
 def test_time_out_says_what_was_missing(motor_unit_cell: Cell) -> None:
+    """And it comes in time."""
+    simulation = Simulation(motor_unit_cell)
     phase = Phase(Kind.GO, PushesBack("left", 20.0), timeout=0.01, subject="motor")
+    with pytest.raises(PhaseFailed) as failed:
+        simulation.run_phase(phase)
+    assert failed.value.phase == "motor: go"
+    assert failed.value.evidence.startswith("end condition not met in 0.01 s: the left arm is")
+    assert simulation.time == pytest.approx(0.01, abs=2.5 * simulation.time_step)
+
+
+def test_vacuum_that_is_not_reached_is_named(motor_unit_cell: Cell) -> None:
+    """A pump of 90 kPa with a time constant of 0.25 s is at 49.6 kPa after 0.2 s [D]."""
+    start = (lambda running: running.cell.fixture.fix(running.root),)
+    phase = Phase(Kind.GO, Signal("fixture fixed"), timeout=0.2, subject="motor", start=start)
     with pytest.raises(PhaseFailed) as failed:
         Simulation(motor_unit_cell).run_phase(phase)
     assert failed.value.phase == "motor: go"
-    assert failed.value.evidence.startswith("end condition not met in 0.01 s: the left arm is")
+    assert failed.value.evidence == (
+        "end condition not met in 0.2 s: no signal 'fixture fixed': "
+        "the vacuum is 49.7 kPa, not 85.5 kPa"
+    )
 
 
 @pytest.mark.parametrize("kind", ["motion", "servo"])

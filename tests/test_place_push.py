@@ -1,6 +1,9 @@
 """The place and push commands: input validation, results and their files."""
 
 import json
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,10 @@ from pydrake.math import RigidTransform
 
 from cell import CellConfig
 from cell.simulation.log import Log
+from experiments.campaigns import campaign
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.campaigns.trial import Row, Trial
 from experiments.cli.main import main
 from experiments.paper import place_push
 from experiments.paper.case_results import Experiment, by_outcome, verdict
@@ -110,6 +117,53 @@ def test_result_says_that_the_trials_run_and_why_they_ended(
         run_experiment(experiment, "motor/P2")
     assert (seen[0]["verdict"], seen[0]["cases"]) == ("running", [])
     assert json.loads((tmp_path / "result.json").read_text())["verdict"] == said
+
+
+@contextmanager
+def here(address: str, workers: int) -> Iterator[ThreadPoolExecutor]:
+    """Run trials in this process."""
+    with ThreadPoolExecutor(1) as pool:
+        yield pool
+
+
+def test_case_that_cannot_be_run_is_a_row_of_a_campaign(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One that does not exist, and a part wider than the bag; neither ends the others."""
+    monkeypatch.setattr(campaign, "pool_at", here)
+    small = {"jig.bag.cap_height": 0.005}  # Its aperture measures 48 mm.
+    for experiment, good, bad in (("place", "plate/P1", "P9"), ("push", "plate/P1/a", "plate/P9")):
+        points = [{"case": bad}, {"case": good, **small}, {"case": good, "hand": "foot"}]
+        rows = run_campaign(trials(experiment, points), tmp_path / experiment)
+        assert [row.verdict for row in rows] == ["error"] * 3
+        for row, culprit in zip(rows, (f"'{bad}'", "70 mm wide", "'foot'"), strict=True):
+            assert culprit in row.evidence
+        summary = json.loads((tmp_path / experiment / "summary.json").read_text())
+        assert (summary["verdict"], summary["error"]) == ("error", 3)
+        assert (tmp_path / experiment / "trials.parquet").exists()
+        assert bad in (tmp_path / experiment / "report.html").read_text()
+
+
+@pytest.mark.parametrize(("kind", "code"), [("failure", 1), ("error", 3)])
+def test_trial_that_ends_before_it_is_simulated_is_counted_and_reported(
+    kind: str, code: int, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It has no log: of a planner that finds no way, or of an error."""
+
+    def ended(wanted: list[Trial], *_: object, **__: object) -> list[Row]:
+        rows = []
+        for trial in wanted:
+            about = (trial.key, "place", trial.product, 0, trial.varied, trial.options, {})
+            rows.append(Row(*about, kind, phase="unknown", evidence="no path was found"))
+        return rows
+
+    monkeypatch.setattr(place_push, "run_campaign", ended)
+    experiment = Experiment("place", CellConfig(), "rig", 2, 0, tmp_path, quiet=True)
+    assert run_experiment(experiment, "motor/P2") == code
+    (case,) = json.loads((tmp_path / "result.json").read_text())["cases"]
+    assert (case["trials"], case["successes"]) == (2, 0)
+    assert "no path was found" in (tmp_path / "report.html").read_text()
+    assert place_push.timed(ended(trials("place"))[0], tmp_path) is None
 
 
 def case_with(label: str, displacements: list[float]) -> CaseResult:

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 import yaml
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from cell.configuration.__main__ import GENERATED
@@ -84,6 +84,7 @@ def test_nearest_valid_number_is_valid() -> None:
     assert info.nearest(0.3) == 0.3
 
 
+@settings(deadline=None)  # A busy machine is no failure.
 @given(st.sampled_from(SCALARS), st.floats(0.0, 1.0))
 def test_any_number_in_its_range_is_kept_exactly(entry: Entry, share: float) -> None:
     lower, upper = ends(entry.info)

@@ -136,6 +136,9 @@ class Below:
         return f"the {self.point.frame.name()} is {above:.2f} mm too high"
 
 
+FIXED = "fixture fixed"  # The signal whose absence the fixture can explain.
+
+
 @in_programs
 @dataclass(frozen=True)
 class Signal:
@@ -149,7 +152,8 @@ class Signal:
 
     def missing(self, sensed: Sensed) -> str:
         """Return what it is waiting for."""
-        return f"no signal '{self.name}'"
+        reason = sensed.lacking() if self.name == FIXED else ""
+        return f"no signal '{self.name}'{f': {reason}' if reason else ''}"
 
 
 @in_programs

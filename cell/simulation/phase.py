@@ -114,6 +114,7 @@ class Sensed:
         finished: Whether every motion of the phase has come to its end.
         X_WF: Pose of a frame, from the joint encoders.
         signal: What a device says by name: "fixture fixed", "fixture freed", "NAME in bit".
+        lacking: What keeps the fixture from holding, in words; "" if it holds, or cannot say.
     """
 
     time: float
@@ -124,6 +125,7 @@ class Sensed:
     finished: bool
     X_WF: Callable[[Frame], RigidTransform]
     signal: Callable[[str], bool] = field(default=lambda name: False)
+    lacking: Callable[[], str] = field(default=lambda: "")
 
 
 Condition = Callable[[Sensed], bool]

@@ -267,6 +267,7 @@ class _PhaseRun:
             finished=all(now >= motion.duration for motion in motions),
             X_WF=lambda frame: frame.CalcPoseInWorld(context),
             signal=self._signal,
+            lacking=lambda: self.cell.fixture.lacking(self.root),
         )
         if self.phase.fine_log or simulation.steps % self.log_every == 0:
             self._log(self.last)

@@ -115,10 +115,10 @@ def results_of(cases: Sequence[Case], rows: Sequence[Row], out: Path) -> list[Ca
 
 
 def _result(row: Row, out: Path) -> TrialResult:
-    """Return a trial with its log; one that came to no verdict has none."""
-    trial = TrialRecord(planned=RigidTransform())
-    if row.done:
-        with np.load(trial_folder(out, row.key) / LOG) as arrays:
+    """Return a trial with its log; one that came to no verdict, or failed early, has none."""
+    trial, log = TrialRecord(planned=RigidTransform()), trial_folder(out, row.key) / LOG
+    if row.done and log.exists():
+        with np.load(log) as arrays:
             trial, _ = from_arrays(dict(arrays))
     stopped = row.verdict != "success" and row.phase != CRITERION
     failure = (row.phase or row.verdict, row.evidence) if stopped else None
@@ -126,9 +126,15 @@ def _result(row: Row, out: Path) -> TrialResult:
     return TrialResult(row.verdict == "success", measured, failure, trial)
 
 
-def timed(row: Row, out: Path) -> tuple[Meter, float]:
-    """Return what a trial spent, and the CPU time of a kernel iteration meanwhile [s]."""
-    with np.load(trial_folder(out, row.key) / LOG) as arrays:
+def timed(row: Row, out: Path) -> tuple[Meter, float] | None:
+    """Return what a trial spent, and the CPU time of a kernel iteration meanwhile [s].
+
+    None if it failed before it was simulated.
+    """
+    log = trial_folder(out, row.key) / LOG
+    if not log.exists():
+        return None
+    with np.load(log) as arrays:
         trial, kernel = from_arrays(dict(arrays))
     return trial.meter, kernel
 

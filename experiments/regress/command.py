@@ -129,7 +129,8 @@ class Regression:
             }
             now = {case: metrics_of(rows) for case, rows in found.items() if case not in errors}
             ended = [row for rows in found.values() for row in rows if row.done]
-            speed = ratios(timed(row, out) for row in ended if row.options.get("timed"))
+            spent = (timed(row, out) for row in ended if row.options.get("timed"))
+            speed = ratios(each for each in spent if each is not None)
             return self._conclude(result, console, now, speed, errors)
 
     def _tell_versions(self, console: Console) -> None:
