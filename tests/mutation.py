@@ -2,8 +2,8 @@
 
     python tests/mutation.py [--trust] [NUMBER ...]
 
-Each mutant of `MUTANTS` changes one line in a copy of the tracked files, in which the fast test
-files that are named with it are run: it is caught if one of them fails, and survives if none does.
+Each mutant of ``mutants.yaml`` changes one line in a copy of the tracked files, in which the fast
+tests that are named with it are run: it is caught if one of them fails, and survives if none does.
 The tests are run without a mutant first, unless they are to be trusted. Takes some ten minutes of
 one core, at the lowest priority. Exit code 0: at least `GOAL` are caught.
 """
@@ -16,12 +16,14 @@ import shutil
 import subprocess
 import sys
 import tempfile
+from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from importlib import import_module
 from pathlib import Path
 
 import pytest
+import yaml
 
 ROOT = Path(__file__).resolve().parent.parent
 GOAL = 0.9
@@ -41,215 +43,20 @@ class Mutant:
         file: In which.
         old: Text that occurs once in it.
         new: What stands there instead.
-        tests: Names of test files, without ``test_`` and ending.
+        tests: Test files, without ``test_`` and ending, or tests of them, ``FILE::TEST``.
     """
 
     wrong: str
     file: str
     old: str
     new: str
-    tests: str
+    tests: list[str]
 
 
-GRASPING, CONDITIONS = "planning/operations/grasping.py", "cell/simulation/conditions.py"
-SIMULATION, JIG = "cell/simulation/simulation.py", "cell/fixtures/soft_jig"
-POLICY, THREAD = "cell/link_policy.py", "cell/workpieces/thread.py"
-THREADS, ALGORITHM = "cell/workpieces/threads.py", "planning/feasibility/algorithm.py"
-FEASIBILITY, CAMPAIGNS = "planning/feasibility", "experiments/campaigns"
-PRODUCT_FILE = "cell/products/product_file.py"
-
-MUTANTS = (
-    # Guards and conditions.
-    Mutant("a lost grasp is noticed late", GRASPING, "held - LOST)", "held - 2 * LOST)", "guards"),
-    Mutant(
-        "a part left behind is not noticed",
-        GRASPING, "LEFT_BEHIND = 0.03", "LEFT_BEHIND = 0.3", "guards",
-    ),
-    Mutant(
-        "the guard of the force reads a torque",
-        CONDITIONS, "force = float(np.linalg.norm(sensed.wrench[self.arm][3:]))",
-        "force = float(np.linalg.norm(sensed.wrench[self.arm][:3]))", "guards",
-    ),
-    Mutant(
-        "an insertion does not watch the grip",
-        "planning/operations/mating.py", "FirstOf((lost_grasp(station), TooMuchForce(",
-        "FirstOf((TooMuchForce(", "guards",
-    ),
-    Mutant(
-        "a push from below counts with the wrong sign",
-        CONDITIONS, "bool(sensed.wrench[self.arm][5] >= self.force)",
-        "bool(-sensed.wrench[self.arm][5] >= self.force)", "guards",
-    ),
-    Mutant(
-        "a time-out comes a second late",
-        SIMULATION, "if sensed.time > phase.timeout:", "if sensed.time > phase.timeout + 1.0:",
-        "guards",
-    ),
-    Mutant(
-        "a command that is not finite is noticed only if all of it is not",
-        SIMULATION, "if not all(np.isfinite(value).all() for value in values):",
-        "if not any(np.isfinite(value).all() for value in values):", "guards",
-    ),
-    Mutant(
-        "a quantity that is not a number keeps its limit",
-        "planning/operations/limits.py", "not abs(value) <= limit.limit",
-        "abs(value) > limit.limit", "measures operations",
-    ),
-    Mutant(
-        "a reading counts as steady before it was watched",
-        CONDITIONS, "self._last, self._since = here, sensed.time", "self._last = here", "waiting",
-    ),
-    # Units and signs.
-    Mutant(
-        "angles of a product file are taken for radians",
-        PRODUCT_FILE, 'np.deg2rad(pose.vector("rpy_deg"))', 'pose.vector("rpy_deg")',
-        "loading parts tray",
-    ),
-    Mutant(
-        "the width of a grasp is read in centimetres",
-        PRODUCT_FILE, 'fields.positive("width_mm") * 1e-3', 'fields.positive("width_mm") * 1e-2',
-        "loading parts",
-    ),
-    Mutant(
-        "wrenches are those on the tool, not on the sensor",
-        "cell/machines/sensors.py", "return -(R_WJc.matrix()", "return (R_WJc.matrix()", "jig_base",
-    ),
-    Mutant(
-        "the tray is turned the other way",
-        "experiments/assembly/prepare.py", "nominal.tray_yaw_deg + self.yaw_deg",
-        "nominal.tray_yaw_deg - self.yaw_deg", "station tray",
-    ),
-    Mutant(
-        "the upper end of a range is refused",
-        "cell/setting.py", "number <= self.at_most)\n", "number < self.at_most)\n", "setting",
-    ),
-    Mutant(
-        "turns of a bolt count backwards",
-        THREADS, "(self.engagement(root, bolt).caught_angle - angle)",
-        "(angle - self.engagement(root, bolt).caught_angle)", "thread",
-    ),
-    Mutant(
-        "a part in the hand follows it the wrong way round",
-        "planning/perception/belief.py", "X_WH @ X_WH_then.inverse() @ X_WP",
-        "X_WH_then @ X_WH.inverse() @ X_WP", "belief",
-    ),
-    # Threads and links.
-    Mutant(
-        "a thread catches a bolt that is far below",
-        THREAD, "abs(self.axial) <= gate.axial", "self.axial <= gate.axial", "thread",
-    ),
-    Mutant(
-        "a bolt is not locked when the spindle stops",
-        THREADS, "row = replace(row, state=ThreadState.LOCKED)",
-        "row = replace(row, state=ThreadState.CAUGHT)", "thread",
-    ),
-    Mutant(
-        "a head is linked while it turns",
-        POLICY, "is ThreadState.LOCKED or None", "is ThreadState.CAUGHT or None", "contact_links",
-    ),
-    Mutant(
-        "a part is linked to the soft bed",
-        POLICY, "return self.fixture.fixed(root) or None", "return True", "contact_links",
-    ),
-    Mutant(
-        "what is being mated is linked",
-        POLICY, "return None if frozenset(names) in mating else rule.until(self, root, *names)",
-        "return rule.until(self, root, *names)", "contact_links",
-    ),
-    # The jig.
-    Mutant(
-        "a bag with less vacuum than the pump's never freezes",
-        f"{JIG}/dynamics.py", "vacuum.jam_fraction * memory.target:",
-        "vacuum.jam_fraction * vacuum.pressure:", "soft_jig ports",
-    ),
-    Mutant(
-        "the time constant of the pump is inverted",
-        f"{JIG}/dynamics.py", "-np.expm1(-dt / vacuum.time_constant)",
-        "-np.expm1(-dt * vacuum.time_constant)", "soft_jig",
-    ),
-    Mutant(
-        "cohesion goes with the sine of the friction angle",
-        f"{JIG}/frozen/yielding.py", "confinement * np.tan(soil.friction_angle)",
-        "confinement * np.sin(soil.friction_angle)", "yielding",
-    ),
-    Mutant(
-        "a wall yields actively, not passively",
-        f"{JIG}/frozen/yielding.py", "np.tan(np.pi / 4 + soil.friction_angle / 2)",
-        "np.tan(np.pi / 4 - soil.friction_angle / 2)", "yielding",
-    ),
-    Mutant(
-        "a seal that was broken seals again",
-        f"{JIG}/frozen/suction.py", "self.intact = np.minimum(self.intact, closed)",
-        "self.intact = closed", "suction",
-    ),
-    Mutant(
-        "the bag closes in proportion to the vacuum",
-        f"{JIG}/parameters.py", "(vacuum / FULL_VACUUM) ** self.contraction_exponent",
-        "(vacuum / FULL_VACUUM)", "soft_jig jam_postures",
-    ),
-    Mutant(
-        "a part may be pulled out while the vacuum still holds it",
-        f"{JIG}/jig.py", "return self.memory(root).pressure < VENTED",
-        "return self.memory(root).target < VENTED", "soft_jig",
-    ),
-    Mutant(
-        "more vacuum than the pump has is drawn in silence",
-        f"{JIG}/jig.py", "if not -ROUNDING <= wanted <= most + ROUNDING:",
-        "if not -ROUNDING <= wanted:", "soft_jig ports",
-    ),
-    # The planner.
-    Mutant(
-        "the highest centre of gravity is preferred",
-        ALGORITHM, "lowest = min(heights[j] for j in candidates)",
-        "lowest = max(heights[j] for j in candidates)", "algorithm",
-    ),
-    Mutant(
-        "upright postures are not preferred",
-        ALGORITHM, "candidates = upright or names", "candidates = names", "algorithm",
-    ),
-    Mutant(
-        "the part that comes from above is fixed",
-        ALGORITHM, "if posture == opposite(up):", "if posture == up:", "algorithm",
-    ),
-    Mutant(
-        "parts leave where one of their pairs is free",
-        f"{FEASIBILITY}/matrices.py", "int(touches and bool(free[j][pairs].all()))",
-        "int(touches and bool(free[j][pairs].any()))", "matrices algorithm",
-    ),
-    Mutant(
-        "the reversed motion is entered for the same pair",
-        f"{FEASIBILITY}/interference.py", "free[forward][i, k] = free[opposite(forward)][k, i]",
-        "free[forward][i, k] = free[opposite(forward)][i, k]", "interference",
-    ),
-    # Campaigns, files, comparison.
-    Mutant(
-        "trials of other seeds are the same",
-        f"{CAMPAIGNS}/code_version.py", "config.to_dict(), seed, dict(options)",
-        "config.to_dict(), dict(options)", "campaigns",
-    ),
-    Mutant(
-        "a changed script is not seen",
-        f"{CAMPAIGNS}/code_version.py", "    digest.update(script.read_bytes())\n", "", "campaigns",
-    ),
-    Mutant(
-        "an error is a verdict that stands",
-        f"{CAMPAIGNS}/trial.py", 'DONE = ("success", "failure")',
-        'DONE = ("success", "failure", "error")', "campaign_runs",
-    ),
-    Mutant(
-        "two writers share a temporary file",
-        "cell/whole_file.py", "secrets.token_hex(8)", '"0" * 16', "output folders",
-    ),
-    Mutant(
-        "the smaller of two tolerances applies",
-        "experiments/compare/tolerances.py", "return max(self.absolute,",
-        "return min(self.absolute,", "compare",
-    ),
-    Mutant(
-        "two runs write into one folder",
-        "experiments/reporting/folder_lock.py", "fcntl.LOCK_EX |", "fcntl.LOCK_SH |", "folders",
-    ),
-)  # fmt: skip
+def mutants() -> list[Mutant]:
+    """Return the mutants of the table."""
+    rows = yaml.safe_load((ROOT / "tests" / "mutants.yaml").read_text())
+    return [Mutant(**row) for row in rows]
 
 
 def copied(folder: Path) -> Path:
@@ -264,12 +71,13 @@ def copied(folder: Path) -> Path:
     return folder
 
 
-def tested(folder: Path, tests: str) -> tuple[int, str]:
+def tested(folder: Path, tests: Iterable[str]) -> tuple[int, str]:
     """Run test files in a copy, up to the first failure; return pytest's exit code and output.
 
     In a child of this process, which has imported the libraries already, but nothing of ours.
     """
-    files = [f"tests/test_{name}.py" for name in tests.split()]
+    parts = [name.partition("::") for name in tests]
+    chosen = [f"tests/test_{file}.py{sep}{test}" for file, sep, test in parts]
     log = folder / "mutation.log"
     child = os.fork()
     if child == 0:
@@ -280,7 +88,7 @@ def tested(folder: Path, tests: str) -> tuple[int, str]:
         os.dup2(output, 1)
         os.dup2(output, 2)
         options = ["-x", "-q", "-p", "no:cacheprovider", "-p", "no:xdist"]
-        code = int(pytest.main([*options, *files]))
+        code = int(pytest.main([*options, *chosen]))
         sys.stdout.flush()
         os._exit(code)
     _, status = os.waitpid(child, 0)
@@ -316,13 +124,14 @@ def main() -> int:
     for name in LIBRARIES:
         with suppress(ImportError):
             import_module(name)
+    table = mutants()
     words = [word for word in sys.argv[1:] if word != "--trust"]
-    numbers = [int(word) for word in words] or range(1, len(MUTANTS) + 1)
-    chosen = {number: MUTANTS[number - 1] for number in numbers}
+    numbers = [int(word) for word in words] or range(1, len(table) + 1)
+    chosen = {number: table[number - 1] for number in numbers}
     with tempfile.TemporaryDirectory() as temporary:
         folder = copied(Path(temporary))
-        files = dict.fromkeys(name for mutant in chosen.values() for name in mutant.tests.split())
-        code, output = (0, "") if "--trust" in sys.argv else tested(folder, " ".join(files))
+        files = dict.fromkeys(name for mutant in chosen.values() for name in mutant.tests)
+        code, output = (0, "") if "--trust" in sys.argv else tested(folder, files)
         if code != 0:
             print(output[-3000:], file=sys.stderr)
             raise SystemExit("The tests fail without any mutant.")

@@ -120,6 +120,7 @@ def test_disturbance_is_drawn_from_the_seed() -> None:
     assert np.std([d.yaw_deg for d in draws]) == pytest.approx(1.0, rel=0.1)
     disturbed = one.applied_to(CONFIG)
     assert disturbed.workcell.p_WT[0] == CONFIG.workcell.p_WT[0] + one.x
+    assert disturbed.workcell.tray_yaw_deg == CONFIG.workcell.tray_yaw_deg + one.yaw_deg
     assert replace(disturbed, workcell=CONFIG.workcell) == CONFIG
 
 

@@ -176,6 +176,8 @@ def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
     assert (failed.quantity, failed.value) == ("gap_m", -1.0)
     (failed,) = insertion.failed_checks({k: v for k, v in limits.items() if k != "tilt_rad"})
     assert (failed.quantity, failed.value) == ("tilt_rad", None)
+    (failed,) = insertion.failed_checks(limits | {"gap_m": float("nan")})
+    assert failed.quantity == "gap_m"
 
 
 def test_limits_of_bolts_hold_for_each() -> None:

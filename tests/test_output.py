@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from cell.errors import CellError
+from cell.errors import CellError, InputError
 from experiments.reporting.output import (
     output_folder,
     whole_file,
@@ -24,6 +24,27 @@ def test_interrupted_file_leaves_the_old_one(tmp_path: Path) -> None:
         raise KeyboardInterrupt
     assert path.read_text() == "old"
     assert list(tmp_path.iterdir()) == [path]
+
+
+def test_two_writers_of_a_file_do_not_share_a_temporary_one(tmp_path: Path) -> None:
+    """The last to end wins; neither finds its own gone."""
+    path = tmp_path / "result.json"
+    with whole_file(path) as one:
+        one.write_text("one")
+        with whole_file(path) as other:
+            assert other != one
+            other.write_text("other")
+        assert path.read_text() == "other"
+    assert path.read_text() == "one"
+
+
+def test_folder_of_one_run_is_refused_to_another(tmp_path: Path) -> None:
+    with output_folder(tmp_path):
+        second = output_folder(tmp_path)
+        with pytest.raises(InputError, match="Another run writes to folder"), second:
+            pass
+    with output_folder(tmp_path):
+        pass
 
 
 def test_json_round_trip_of_numpy_values(tmp_path: Path) -> None:

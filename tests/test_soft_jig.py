@@ -74,6 +74,9 @@ def test_states_follow_the_commands_and_the_pressure() -> None:
     assert rig.memory.state is JigState.SOFT
     rig.step(100)
     assert rig.memory.pressure < vacuum.pressure
+    assert not rig.jig.freed(rig.context)  # 57 kPa are left, and 2 kPa after 0.95 s [D].
+    rig.step(860)
+    assert rig.jig.freed(rig.context)
 
 
 def test_part_is_let_go_without_a_kick(held: Held) -> None:

@@ -121,10 +121,11 @@ class PushesBack:
 @in_programs
 @dataclass(frozen=True)
 class Below:
-    """A point of a tool is lower than a height over W [m]."""
+    """A point of a tool is lower than a height over W [m]; ``otherwise``: what it means if not."""
 
     point: Height
     height: float
+    otherwise: str = ""
 
     def __call__(self, sensed: Sensed) -> bool:
         """Return whether it is."""
@@ -133,7 +134,8 @@ class Below:
     def missing(self, sensed: Sensed) -> str:
         """Return what it is waiting for."""
         above = 1e3 * (self.point(sensed)[0] - self.height)
-        return f"the {self.point.frame.name()} is {above:.2f} mm too high"
+        high = f"the {self.point.frame.name()} is {above:.2f} mm too high"
+        return f"{self.otherwise}: {high}" if self.otherwise else high
 
 
 FIXED = "fixture fixed"  # The signal whose absence the fixture can explain.

@@ -242,7 +242,9 @@ def _insert(
         mouth = gap(outcome)
         pitch, speed = config.search_pitch, config.search_speed
         search = Spiral(raised(X_WSeat, mouth - BEYOND), pitch, speed)
-        found = Below(height, float(X_WSeat.translation()[2]) + mouth - 1e-3)
+        around = 1e3 * config.search_radius
+        stuck = f"{mating.part} does not slide onto {mating.on}, tried up to {around:g} mm aside"
+        found = Below(height, float(X_WSeat.translation()[2]) + mouth - 1e-3, stuck)
         length = config.search_radius**2 * np.pi / config.search_pitch
         yield soft(
             MatePhase.SEARCH, config.search_force, search, found, length / config.search_speed
