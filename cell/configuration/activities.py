@@ -195,8 +195,13 @@ class DisturbanceConfig:
 
 @dataclass(frozen=True)
 class SensorConfig:
-    """Noise of the sensed poses of parts."""
+    """How it is sensed where parts are."""
 
+    source: str = setting(
+        "truth", "", "truth (with the noise below), camera (depth images of that on the hand), "
+        "or blind (nothing is sensed: the tray is where the layout has it).",
+        "[A] The truth by default.",
+    )  # fmt: skip
     position_noise: float = setting(
         0.0, "m", "Standard deviation of a sensed position, per axis.",
         "[A] The true pose by default.",

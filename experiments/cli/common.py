@@ -41,14 +41,17 @@ class Common:
     quiet: bool = False
     """Print nothing but errors."""
 
-    def load_config(self, fixture: str | None = None) -> CellConfig:
+    def load_config(self, fixture: str | None = None, sensor: str | None = None) -> CellConfig:
         """Return the configuration that the options describe, checked.
 
         Args:
             fixture: Name of another fixture than the configuration's; None leaves it.
+            sensor: Name of another perception source than the configuration's; None leaves it. A
+                camera is mounted on the hand if it is to be used.
         """
         from cell.configuration.config import CellConfig
         from cell.fixtures import fixture_class
+        from planning.perception.sources import CAMERA, check_source
 
         if self.seed < 0:
             raise BadUsage(f"--seed must be >= 0, not {self.seed}.")
@@ -56,6 +59,11 @@ class Common:
         if fixture is not None:
             config = config.with_changes({"workcell.fixture": fixture})
         fixture_class(config.workcell.fixture)
+        if sensor is not None:
+            config = config.with_changes({"sensor.source": sensor})
+        check_source(config.sensor.source)
+        if config.sensor.source == CAMERA:
+            config = config.with_changes({"camera.mounted": True})
         return config
 
 

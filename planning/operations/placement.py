@@ -19,7 +19,7 @@ from cell.vectors import rotation_with_up
 from planning.feasibility.directions import unit_vector
 from planning.motion.paths import NoPath, plan_line
 from planning.operations.grasping import Reach, backed_off, raised
-from planning.operations.station import Placement, Station
+from planning.operations.station import FIXTURE, Placement, Station
 
 YAWS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 RETREAT = 0.08  # The hand backs off this far when it has let go [m] [A].
@@ -103,7 +103,7 @@ def choose_placement(
     for yaw, X_WP, q in _placeable(station, part, up, reach, top + HOVER, yaws):
         X_WSeated = seated(station, part, X_WP)
         X_WA = X_WSeated @ station.part(part).X_AP.inverse()
-        leaves = _leaves(station, reach, X_WSeated @ reach.grasp.X_PJaw, q)
+        leaves = _leaves(station, part, reach, X_WSeated @ reach.grasp.X_PJaw, q)
         mates = all(_mates(station, name, X_WA) for name in later)
         if leaves and mates and suits(X_WSeated):
             return Placement(yaw, X_WP, q)
@@ -162,12 +162,19 @@ def _placeable(
         yield yaw, X_WP, q
 
 
-def _leaves(station: Station, reach: Reach, X_WJaw: RigidTransform, q: np.ndarray) -> bool:
-    """Return whether the hand can back off straight from a jaw pose, with joints near ``q``."""
+def _leaves(
+    station: Station, part: str, reach: Reach, X_WJaw: RigidTransform, q: np.ndarray
+) -> bool:
+    """Return whether the hand can press at a jaw pose and back off, with joints near ``q``.
+
+    Beside the fixture, which gives way, it keeps clear of everything down there.
+    """
     arm, context = station.holder, station.context
     frame = arm.frame(reach.grasp.jaw)
+    may_touch = [(station.hand, FIXTURE), (station.hand, "held"), ("held", "*")]
+    may_touch.append((station.hand, part))
     try:
-        for q_at in arm.configurations(context, frame, X_WJaw, q)[:1]:
+        for q_at in station.configurations(arm, frame, X_WJaw, q, may_touch)[:1]:
             plan_line(arm, context, frame, q_at, backed_off(X_WJaw, RETREAT))
             return True
     except (Unreachable, NoPath):

@@ -121,9 +121,13 @@ class Station:
         """Names of the part in the hand and of what rides on it."""
         return () if self.held is None else (self.held, *self.riders)
 
-    def look(self, *parts: str) -> None:
-        """Refresh the belief about some parts, or about all; everything must stand still."""
-        self.belief.look(parts or [part.part.name for part in self.cell.parts])
+    def look(self, *parts: str) -> frozenset[str]:
+        """Refresh the belief about some parts, or about all; everything must stand still.
+
+        Returns:
+            The names of those that were seen.
+        """
+        return self.belief.look(parts or [part.part.name for part in self.cell.parts])
 
     def pose_of(self, part: str) -> RigidTransform:
         """Return the believed pose X_WP of a part."""

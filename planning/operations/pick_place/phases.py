@@ -68,7 +68,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     (part,) = step.parts
     product = station.cell.product
     yield from pick_place(station, part, product.up, brought_to(product, part))
-    yield from look(station, PlacePhase.LOOK_AGAIN, part)
+    yield from look(station, PlacePhase.LOOK_AGAIN, part, closely=(part,))
 
 
 def foresee(station: Station, step: Step) -> tuple[str, ...]:
@@ -115,7 +115,13 @@ def pick_place(
     """
     arm, awake = station.holder, frozenset([part])
     yield from look(
-        station, PlacePhase.LOOK, part, settle=LOOK_TIME, start=(prepare_fixture,), awake=awake
+        station,
+        PlacePhase.LOOK,
+        part,
+        closely=(part,),
+        settle=LOOK_TIME,
+        start=(prepare_fixture,),
+        awake=awake,
     )
     station.origins[part] = station.pose_of(part)
     reach, placement = _choose(station, part, up, later, suits)
