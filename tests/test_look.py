@@ -13,7 +13,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from teleport import carry_out
 
 from cell.configuration.config import CellConfig
-from cell.errors import InputError, UnknownName
+from cell.errors import UnknownName
 from cell.machines.cameras.rendering import rendering_problem  # noqa: F401
 from cell.products.loading import load_product
 from cell.simulation.phase import Phase, PhaseFailed
@@ -28,7 +28,7 @@ from planning.perception.layout import Blind, parts_in_tray, tray_expected
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
 PRODUCT = load_product("motor_unit")
 DISTURBED = {"disturbance.tray_position_sigma": 2e-3, "disturbance.tray_yaw_sigma_deg": 3.0}
-SEEING = {"sensor.source": "camera", "camera.mounted": True, **DISTURBED}
+SEEING = {"sensor.source": "camera", **DISTURBED}
 
 
 class Kind(Enum):
@@ -104,12 +104,6 @@ def test_sensor_that_does_not_exist_is_bad_input(
     assert not (tmp_path / "out").exists()
     with pytest.raises(UnknownName):
         RunningCell(PRODUCT, config(**{"sensor.source": "lidar"}), 0)
-
-
-@needs_rendering
-def test_camera_that_nobody_carries_is_bad_input() -> None:
-    with pytest.raises(InputError, match="camera.mounted"):
-        RunningCell(PRODUCT, config(**{"sensor.source": "camera"}), 0)
 
 
 # What the camera sees.

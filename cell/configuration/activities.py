@@ -193,12 +193,15 @@ class DisturbanceConfig:
     )  # fmt: skip
 
 
+TRUTH, CAMERA, BLIND = "truth", "camera", "blind"  # Sources of `SensorConfig`.
+
+
 @dataclass(frozen=True)
 class SensorConfig:
     """How it is sensed where parts are."""
 
     source: str = setting(
-        "truth", "", "truth (with the noise below), camera (depth images of that on the hand), "
+        TRUTH, "", "truth (with the noise below), camera (depth images of that on the hand), "
         "or blind (nothing is sensed: the tray is where the layout has it).",
         "[A] The truth by default.",
     )  # fmt: skip

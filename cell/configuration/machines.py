@@ -176,7 +176,8 @@ class CameraConfig:
     """The depth cameras: one on the hand that grips, if it is mounted, one fixed above the jig."""
 
     mounted: bool = setting(
-        False, "", "Whether the hand carries a camera; it then is in the collision model, too.",
+        False, "", "Whether the hand carries a camera, in the collision model, too; with "
+        "sensor.source=camera it does.",
         "[S] The paper's discussion: a hand-eye RealSense D435.",
     )  # fmt: skip
     p_MC: tuple[float, float, float] = setting(

@@ -46,12 +46,11 @@ class Common:
 
         Args:
             fixture: Name of another fixture than the configuration's; None leaves it.
-            sensor: Name of another perception source than the configuration's; None leaves it. A
-                camera is mounted on the hand if it is to be used.
+            sensor: Name of another perception source than the configuration's; None leaves it.
         """
         from cell.configuration.config import CellConfig
         from cell.fixtures import fixture_class
-        from planning.perception.sources import CAMERA, check_source
+        from planning.perception.sources import check_source
 
         if self.seed < 0:
             raise BadUsage(f"--seed must be >= 0, not {self.seed}.")
@@ -62,8 +61,6 @@ class Common:
         if sensor is not None:
             config = config.with_changes({"sensor.source": sensor})
         check_source(config.sensor.source)
-        if config.sensor.source == CAMERA:
-            config = config.with_changes({"camera.mounted": True})
         return config
 
 

@@ -19,7 +19,6 @@ from pydrake.systems.framework import Context
 
 from cell.builder import Cell
 from cell.configuration.config import CellConfig
-from cell.errors import InputError
 from cell.machines.cameras.camera import HAND_EYE, Camera, Picture
 from cell.products.product import Product
 from planning.perception.belief import NEVER, Estimate, random_state, restore_random_state
@@ -72,12 +71,7 @@ class HandEye:
             root: Context of its diagram.
             config: What the planner believes the cell to be.
             seed: Of the depth noise.
-
-        Raises:
-            InputError: The hand carries no camera.
         """
-        if HAND_EYE not in cell.cameras:
-            raise InputError("The hand carries no camera: set camera.mounted=true.")
         rng = np.random.default_rng([seed, 2])
         return HandEye(cell.cameras[HAND_EYE], root, cell.product, tray_expected(config), rng)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from pydrake.systems.framework import Context
 
 from cell.builder import Cell
+from cell.configuration.activities import BLIND, CAMERA, TRUTH
 from cell.configuration.config import CellConfig
 from cell.errors import UnknownName
 from cell.machines.cameras.rendering import NoRendering, rendering_problem
@@ -12,7 +13,6 @@ from planning.perception.belief import Estimate, Source, TruthSource
 from planning.perception.hand_eye import HandEye
 from planning.perception.layout import Blind, parts_in_tray, tray_expected
 
-TRUTH, CAMERA, BLIND = "truth", "camera", "blind"
 SOURCES = (TRUTH, CAMERA, BLIND)
 
 
@@ -41,7 +41,6 @@ def source_of(
 
     Raises:
         UnknownName: There is no such source.
-        InputError: The hand carries no camera.
         NoRendering: This machine cannot render what a camera sees.
     """
     name = config.sensor.source

@@ -187,7 +187,7 @@ def cameras_of(
         dropouts=config.dropouts,
     )
     places = {ABOVE: (plant.world_body(), above.X_WC)}
-    if config.mounted:
+    if plant.HasBodyNamed(HAND_EYE):
         places[HAND_EYE] = (plant.GetBodyByName(HAND_EYE), RigidTransform())
     return {
         name: Camera(name, plant, scene_graph, body, X_BC, above.pinhole, stereo)
