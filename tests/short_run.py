@@ -17,7 +17,7 @@ from enum import Enum
 import numpy as np
 
 from cell.builder import Cell
-from cell.simulation.phase import Phase, after
+from cell.simulation.phase import Phase, Running, after
 from experiments.assembly import assemble
 from experiments.cli.single import run_script
 from planning.operations.operation import Arrays, Operation, Step, StepRecord
@@ -35,8 +35,11 @@ class Hold(Enum):
 def hold(station: Station, step: Step) -> Iterator[Phase]:
     """Look, with noise, and hold still while the motor stands in the tray, awake."""
     awake = frozenset(["motor"])
-    look = (lambda running: station.look("motor"),)
-    yield Phase(Hold.LOOK, after(0.1), 1.0, subject="motor", awake=awake, start=look)
+
+    def look(running: Running) -> None:
+        station.look("motor")
+
+    yield Phase(Hold.LOOK, after(0.1), 1.0, subject="motor", awake=awake, start=(look,))
     timeout = 0.05 if os.environ.get("FAIL") == step.name else 9.0
     yield Phase(Hold.HOLD, after(0.2), timeout, subject="motor", awake=awake)
 

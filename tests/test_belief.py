@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from types import SimpleNamespace
 from typing import cast
@@ -32,7 +32,7 @@ class Scene:
     duration: float = 0.0
     looks: int = 0
 
-    def look(self, parts: Sequence[str]) -> dict[str, Estimate]:
+    def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
         self.looks += 1
         return {name: Estimate(self.truth[name], np.zeros((6, 6)), self.time) for name in parts}
 
@@ -123,7 +123,7 @@ def truth_source(position_noise: float, angle_noise: float) -> TruthSource:
 
 
 def test_without_noise_the_truth_is_seen() -> None:
-    estimate = truth_source(0.0, 0.0).look(["motor"])["motor"]
+    estimate = truth_source(0.0, 0.0).look(["motor"], {})["motor"]
     assert estimate.X_WP.IsExactlyEqualTo(X_AT_HOME)
     assert not estimate.covariance.any()
     assert estimate.time == 2.0
@@ -131,7 +131,7 @@ def test_without_noise_the_truth_is_seen() -> None:
 
 def test_noise_is_as_large_as_its_covariance_says() -> None:
     source = truth_source(1e-3, 0.02)
-    seen = [source.look(["motor"])["motor"] for _ in range(600)]
+    seen = [source.look(["motor"], {})["motor"] for _ in range(600)]
     offsets = [e.X_WP.translation() - X_AT_HOME.translation() for e in seen]
     turns = [RollPitchYaw(X_AT_HOME.rotation().inverse() @ e.X_WP.rotation()) for e in seen]
     errors = np.hstack([[turn.vector() for turn in turns], offsets])
@@ -140,7 +140,7 @@ def test_noise_is_as_large_as_its_covariance_says() -> None:
 
 def test_restored_source_sees_the_same_again() -> None:
     source, other = truth_source(1e-3, 0.02), truth_source(1e-3, 0.02)
-    source.look(["motor"])
+    source.look(["motor"], {})
     other.restore(source.save())
-    expected, again = (s.look(["motor"])["motor"].X_WP for s in (source, other))
+    expected, again = (s.look(["motor"], {})["motor"].X_WP for s in (source, other))
     assert again.IsExactlyEqualTo(expected)

@@ -152,7 +152,10 @@ def test_the_hand_carries_its_camera_where_the_planner_knows_of_it(sees) -> None
     assert moved.IsNearlyEqualTo(X_MC, 1e-12)
     assert X_MC.IsNearlyEqualTo(sees.config.camera.X_MC, 1e-12)
     # The optical axis leans towards the fingers: it meets the line through them further out.
-    assert (X_MC.rotation().matrix() @ [0.0, 0.0, 1.0])[1] > 0.2
+    lean, side = (X_MC.rotation().matrix() @ [0.0, 0.0, 1.0])[1], X_MC.translation()[1]
+    assert abs(lean) > 0.2 and lean * side < 0.0
+    # They are at the bottom of the image.
+    assert (X_MC.inverse() @ np.array([0.0, 0.0, 0.15]))[1] > 0.0
     assert len(sees.plant.GetCollisionGeometriesForBody(eye.body)) == 1
 
 

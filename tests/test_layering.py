@@ -18,6 +18,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "paths": set(),
         "bodies": set(),
         "setting": set(),
+        "shapes": set(),
         "forces": set(),
         "vectors": set(),
         "yaml_text": {"errors"},
@@ -71,8 +72,8 @@ LAYERS: dict[str, dict[str, set[str]]] = {
 }  # fmt: skip
 EVERYWHERE = {
     "cell": {
-        "bodies", "errors", "paths", "setting", "forces", "sleep", "vectors", "whole_file",
-        "yaml_text",
+        "bodies", "errors", "paths", "setting", "shapes", "forces", "sleep", "vectors",
+        "whole_file", "yaml_text",
     },
     "planning": set(),
     "experiments": set(),

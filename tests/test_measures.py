@@ -18,7 +18,7 @@ from planning.operations.log_rows import rows_between
 from planning.operations.mating_measures import riders_standing, seat_errors
 from planning.operations.measures import force_plate_peaks, moved
 from planning.operations.operation import PhaseRecord, Step, StepRecord
-from planning.operations.pick_place.measures import placement_errors
+from planning.operations.placement import placement_errors
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.set_aside.measures import measure as measure_set_aside
 from planning.operations.set_aside.phases import AsidePhase

@@ -193,10 +193,18 @@ class DisturbanceConfig:
     )  # fmt: skip
 
 
+TRUTH, CAMERA, BLIND = "truth", "camera", "blind"  # Sources of `SensorConfig`.
+
+
 @dataclass(frozen=True)
 class SensorConfig:
-    """Noise of the sensed poses of parts."""
+    """How it is sensed where parts are."""
 
+    source: str = setting(
+        TRUTH, "", "truth (with the noise below), camera (depth images of that on the hand), "
+        "or blind (nothing is sensed: the tray is where the layout has it).",
+        "[A] The truth by default.",
+    )  # fmt: skip
     position_noise: float = setting(
         0.0, "m", "Standard deviation of a sensed position, per axis.",
         "[A] The true pose by default.",

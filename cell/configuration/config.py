@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from cell.configuration.activities import (
+    CAMERA,
     DisturbanceConfig,
     InsertionConfig,
     MotionConfig,
@@ -58,6 +59,11 @@ class CellConfig:
     disturbance: DisturbanceConfig = DisturbanceConfig()
     sensor: SensorConfig = SensorConfig()
     camera: CameraConfig = CameraConfig()
+
+    @property
+    def hand_eye(self) -> bool:
+        """Whether the hand carries a camera: it is mounted, or it is what the cell senses with."""
+        return self.camera.mounted or self.sensor.source == CAMERA
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "arms", FrozenDict(self.arms))

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.math import RigidTransform, RollPitchYaw, RotationMatrix
 
 from cell.fixtures.jig_dimensions import J_HEIGHT
 from cell.setting import setting
@@ -176,12 +176,14 @@ class CameraConfig:
     """The depth cameras: one on the hand that grips, if it is mounted, one fixed above the jig."""
 
     mounted: bool = setting(
-        False, "", "Whether the hand carries a camera; it then is in the collision model, too.",
+        False, "", "Whether the hand carries a camera, in the collision model, too; with "
+        "sensor.source=camera it does.",
         "[S] The paper's discussion: a hand-eye RealSense D435.",
     )  # fmt: skip
     p_MC: tuple[float, float, float] = setting(
-        (0.0, -0.075, 0.035), "m", "Camera on the hand: its origin in the tool's frame mount.",
-        "[M] Every look at the jig from 45 to 88 deg above, at 0.25 and 0.32 m, is reachable.",
+        (0.0, 0.075, 0.035), "m", "Camera on the hand: its origin in the tool's frame mount.",
+        "[M] Above the hand where that presses a standing motor in from the side; on the other "
+        "side it would meet the force plate. Looks from 45 to 88 deg above are reachable.",
         at_least=-0.3, at_most=0.3,
     )  # fmt: skip
     tilt_deg: float = setting(
@@ -249,5 +251,7 @@ class CameraConfig:
     @property
     def X_MC(self) -> RigidTransform:
         """Pose of the camera C on the hand in the frame M, mount, of its tool."""
-        tilt = RollPitchYaw(-np.deg2rad(self.tilt_deg), 0.0, 0.0)
-        return RigidTransform(tilt, np.array(self.p_MC))
+        tilt = RotationMatrix.MakeXRotation(-np.deg2rad(self.tilt_deg))
+        # The bottom of the image is on the side of the fingers, on whichever side of them it is.
+        turn = RotationMatrix.MakeZRotation(np.arctan2(self.p_MC[0], -self.p_MC[1]))
+        return RigidTransform(turn @ tilt, np.array(self.p_MC))

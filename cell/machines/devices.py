@@ -112,6 +112,6 @@ def add_arms(
             return kind.add(plant, instance, own.tool_name, own.tool)
 
         arms[name] = add_arm(plant, name, arm_model(arm.model), arm, own.arm, kind.sdf, add_tool)
-        if kind.role == Gripper.role and config.camera.mounted:
+        if kind.role == Gripper.role and config.hand_eye:
             add_hand_eye(plant, arms[name], config.camera)
     return arms

@@ -19,7 +19,7 @@ from experiments.assembly.film import Film
 from experiments.assembly.replay import Replay
 from planning.operations.operation import Operation
 from planning.operations.station import Station
-from planning.perception.belief import TruthSource
+from planning.perception.sources import source_of
 
 TIME_STEP = "time_step"  # In a saved state: of the simulation that it was taken of.
 
@@ -150,8 +150,9 @@ class RunningCell:
         joined = join_monitors(simulation.cell.monitor, *filter(None, monitors))
         simulation.simulator.set_monitor(joined)
         cell, root = simulation.cell, simulation.root
-        source = TruthSource.of(cell, root, self.seed)
+        source, expected = source_of(cell, root, config, self.seed)
         # Planning does not depend on the time step.
         known = next((station.model for _, station in self._built.values()), None)
         station = Station(cell, root, source, self.seed, nominal=config, planning_copy=known)
+        station.belief.estimates |= expected
         return simulation, station

@@ -155,6 +155,7 @@ def _course(run: Run) -> dict[str, Any]:
         "real_time_factor": seconds / max(simulation.stepping_cpu, 1e-9),
         "sim_seconds": seconds,
         "disturbance": asdict(run.running.disturbance),
+        "recoveries": list(run.station.recoveries),
         "contact_links": simulation.cell.links.summary(simulation.root),
     }
     if run.failure is not None:
@@ -171,6 +172,7 @@ def _notes(run: Run, pictures: Pictures) -> list[str]:
     notes = []
     if run.failure is not None:
         notes.append(f"Failed in '{run.failure.phase}': {run.failure.evidence}")
+    notes += run.station.recoveries
     for step in run.steps:
         if step.repeated:
             notes.append(f"{step.name}: {REPEATED}")

@@ -4,17 +4,12 @@ from __future__ import annotations
 
 from collections import defaultdict
 
-import trimesh
 from pydrake.geometry import (
     Box,
-    Capsule,
-    Convex,
     Cylinder,
     GeometryId,
-    Mesh,
     Rgba,
     SceneGraphInspector,
-    Shape,
     Sphere,
 )
 from pydrake.multibody.plant import MultibodyPlant
@@ -25,6 +20,7 @@ from cell.fixtures.soft_jig import SoftJig
 from cell.fixtures.soft_jig.bed_geometry import MEMBRANE, SILICONE_COLOR
 from cell.fixtures.soft_jig.soft.bed import Bed
 from cell.fixtures.soft_jig.visual import membrane_mesh
+from cell.shapes import shape_mesh
 from experiments.assembly.foxglove import Value, entity, solid, triangles
 
 GREY = Rgba(0.6, 0.6, 0.6, 1.0)  # Of what has no colour of its own.
@@ -77,22 +73,5 @@ def _primitive(inspector: SceneGraphInspector, geometry: GeometryId) -> tuple[st
         width = 2 * shape.radius()
         scales = {"bottom_scale": 1.0, "top_scale": 1.0}
         return "cylinders", solid(X, [width, width, shape.length()], rgba) | scales
-    mesh = _mesh(shape)
+    mesh = shape_mesh(shape)
     return "triangles", triangles(X, mesh.vertices, mesh.faces, rgba)
-
-
-def _mesh(shape: Shape) -> trimesh.Trimesh:
-    """Return any other shape as triangles."""
-    if isinstance(shape, Capsule):
-        return trimesh.creation.capsule(shape.length(), shape.radius())
-    assert isinstance(shape, Mesh | Convex), type(shape).__name__
-    source = shape.source()
-    file = (
-        source.path()
-        if source.is_path()
-        else trimesh.util.wrap_as_stream(source.in_memory().mesh_file.contents())
-    )
-    kind = shape.extension().removeprefix(".")
-    mesh = trimesh.load_mesh(file, file_type=kind, force="mesh", process=False)
-    mesh.apply_scale(shape.scale3())
-    return mesh

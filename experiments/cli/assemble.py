@@ -29,6 +29,9 @@ class Assemble:
     fixture: Annotated[str | None, arg(metavar="NAME")] = None
     """soft_jig, rigid_jig, support_jig or flat_plate. Default: workcell.fixture."""
 
+    sensor: Annotated[str | None, arg(metavar="NAME")] = None
+    """truth, camera or blind: how it is sensed where parts are. Default: sensor.source."""
+
     start: Annotated[Path | None, arg(metavar="STATE.npz")] = None
     """Go on from state.npz or failed_state.npz of a run with the same product, order and seed."""
 
@@ -62,7 +65,7 @@ class Assemble:
         Raises:
             InputError: Something that was given cannot be used; nothing is written.
         """
-        config = self.common.load_config(self.fixture)
+        config = self.common.load_config(self.fixture, self.sensor)
         with contextlib.ExitStack() as folders:
             from experiments.assembly.results import FILES
 

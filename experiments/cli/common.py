@@ -41,14 +41,16 @@ class Common:
     quiet: bool = False
     """Print nothing but errors."""
 
-    def load_config(self, fixture: str | None = None) -> CellConfig:
+    def load_config(self, fixture: str | None = None, sensor: str | None = None) -> CellConfig:
         """Return the configuration that the options describe, checked.
 
         Args:
             fixture: Name of another fixture than the configuration's; None leaves it.
+            sensor: Name of another perception source than the configuration's; None leaves it.
         """
         from cell.configuration.config import CellConfig
         from cell.fixtures import fixture_class
+        from planning.perception.sources import check_source
 
         if self.seed < 0:
             raise BadUsage(f"--seed must be >= 0, not {self.seed}.")
@@ -56,6 +58,9 @@ class Common:
         if fixture is not None:
             config = config.with_changes({"workcell.fixture": fixture})
         fixture_class(config.workcell.fixture)
+        if sensor is not None:
+            config = config.with_changes({"sensor.source": sensor})
+        check_source(config.sensor.source)
         return config
 
 

@@ -7,7 +7,7 @@ is not looked at again before it is placed; the jig is not quite where it was se
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import Enum
 from typing import cast
@@ -73,9 +73,9 @@ class DrawnSource:
     station: Station | None = None
     duration: float = 0.0
 
-    def look(self, parts: Sequence[str]) -> dict[str, Estimate]:
+    def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
         """Return where the planner takes parts to be."""
-        seen, station = self.truth.look(parts), self.station
+        seen, station = self.truth.look(parts, known), self.station
         if station is not None and station.held is not None:
             X_WP = station.tool_pose(station.holder, self.grasp.jaw) @ self.grasp.X_PJaw.inverse()
             return {name: replace(estimate, X_WP=X_WP) for name, estimate in seen.items()}

@@ -13,6 +13,7 @@ from cell.configuration.config import CellConfig
 from cell.errors import BadPart
 from cell.fixtures import fixture_class
 from cell.fixtures.custom.fixture import CustomFixture
+from cell.machines.cameras.camera import FixedView
 from cell.products.product import Part, Product
 from cell.simulation.phase import PhaseFailed
 from cell.simulation.state import State
@@ -148,6 +149,7 @@ class TrialRecord:
         held: X_JP in the grasp when the bag has frozen.
         placed: X_JP after the hand has left.
         speed: Of the part at that time [m/s].
+        view: Of the camera above the jig; None if the trial was not run here.
         before, after: X_WJ of the jig before and after the push.
         last_jig: X_WJ of the jig at the end of the trial, also after a failure.
         moved: X_JP of the part at the end of the trial.
@@ -163,6 +165,7 @@ class TrialRecord:
     held: RigidTransform | None = None
     placed: RigidTransform | None = None
     speed: float = 0.0
+    view: FixedView | None = None
     before: RigidTransform | None = None
     after: RigidTransform | None = None
     last_jig: RigidTransform = field(default_factory=RigidTransform)
@@ -244,6 +247,7 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
     """
     observer, stage = hand.observer, hand.observer.stage
     trial = TrialRecord(hand.planned, stage.fixture.seat(stage.part.part.name))
+    trial.view = FixedView.above(observer.X_WJ, stage.config.camera)
     try:
         hand.press()
         trial.planned, trial.held = hand.planned, observer.X_JP

@@ -6,7 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.ndimage import uniform_filter1d
 
-from experiments.paper.camera import seen_displacement
+from experiments.paper.screws import seen_displacement
 from experiments.paper.trial import HOVER, TrialRecord
 from planning.operations.measures import angle_between
 from planning.operations.operation import Measured
@@ -70,13 +70,13 @@ def measure_place(trial: TrialRecord) -> Measured:
 def measure_push(trial: TrialRecord) -> Measured:
     """Return the displacement of the jig, the rotation of the part on it, and the peak forces."""
     begun = start_of(trial, "push") if "time" in trial.log else None
-    if begun is None or trial.before is None:
+    if begun is None or trial.before is None or trial.view is None:
         return {}
     time, normal, shear = plate_forces(trial)
     after = trial.after if trial.after is not None else trial.last_jig
     late = time >= begun
     moved = after.translation() - trial.before.translation()
-    seen, printed = seen_displacement(trial.before, after)
+    seen, printed = seen_displacement(trial.view, trial.before, after)
     turn = trial.before.rotation().inverse() @ after.rotation()
     hand = np.linalg.norm(trial.log["hand_wrench"][:, 3:], axis=1)
     measured = {

@@ -33,6 +33,7 @@ from cell.errors import UnknownName
 from cell.machines.arm import Arm
 
 HELD = "held"  # Stands for what is in the hand.
+MOUNT = "mount"  # The frame of every tool that is on the flange.
 ANYTHING = "*"
 # Parts that are not placed wait here, out of everyone's way [m].
 AWAY = RigidTransform([0.0, 0.0, -100.0])
@@ -92,9 +93,7 @@ class CollisionModel:
         self._held = _add_held_body(self.plant, self.arms[hand[0]], hand[1])
         self._hand = self.arms[hand[0]]
         self._clearances = (arm_clearance, obstacle_clearance)
-        robots = [
-            index for arm in self.arms.values() for index in (arm.instance, arm.tool_instance)
-        ]
+        robots = [index for arm in self.arms.values() for index in _instances(self.plant, arm)]
         with _quiet_drake():
             self._checker = SceneGraphCollisionChecker(
                 model=builder.Build(),
@@ -209,7 +208,7 @@ class CollisionModel:
         owner = {
             int(index): arm.name
             for arm in self.arms.values()
-            for instance in (arm.instance, arm.tool_instance)
+            for instance in _instances(self.plant, arm)
             for index in self.plant.GetBodyIndices(instance)
         }
         padding = np.zeros((self.plant.num_bodies(),) * 2)
@@ -261,6 +260,14 @@ def _quiet_drake() -> Iterator[None]:
         yield
     finally:
         logger.setLevel(level)
+
+
+def _instances(plant: MultibodyPlant, arm: Arm) -> list[ModelInstanceIndex]:
+    """Return the model instances of an arm: its own, its tool's, and those of what that carries."""
+    mount = plant.GetFrameByName(MOUNT, arm.tool_instance).body()
+    carried = {body.model_instance() for body in plant.GetBodiesWeldedTo(mount)}
+    own = [arm.instance, arm.tool_instance]
+    return own + sorted(carried - set(own), key=int)
 
 
 def _add_held_body(plant: MultibodyPlant, arm: Arm, frame: str) -> RigidBody:

@@ -104,7 +104,7 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     held = riding | {part}
     # What bears the part that it comes to has to be there, too: nothing stands on what sleeps.
     both = held | {mating.on, *station.fixed}
-    yield from look(station, MatePhase.LOOK, part)
+    yield from look(station, MatePhase.LOOK, part, closely=(part, mating.on))
     X_WGoal = goal_pose(station, mating)
     reach = first(useful_grasps(station, mating, X_WGoal), part, station)
     yield from take(station, part, reach, LIFT, riders)

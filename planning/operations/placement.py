@@ -6,11 +6,12 @@ part and, later, bring and hold every part that the plan mates with it.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
+from cell.builder import Cell
 from cell.fixtures.base import FixtureError
 from cell.machines.arm import Unreachable
 from cell.products.joints import Fit, Rest
@@ -19,7 +20,7 @@ from cell.vectors import rotation_with_up
 from planning.feasibility.directions import unit_vector
 from planning.motion.paths import NoPath, plan_line
 from planning.operations.grasping import Reach, backed_off, raised
-from planning.operations.station import Placement, Station
+from planning.operations.station import FIXTURE, Placement, Station
 
 YAWS = np.deg2rad(np.arange(0.0, 360.0, 15.0))
 RETREAT = 0.08  # The hand backs off this far when it has let go [m] [A].
@@ -80,6 +81,48 @@ def pose_on_jig(station: Station, part: str, up: str, yaw: float, height: float)
     return RigidTransform(R_WP, station.cell.X_WJ.translation() + offset)
 
 
+def planned_pose(cell: Cell, part: str, placement: Placement) -> RigidTransform:
+    """Return where a placement puts a part: its centre of mass below where it hovers, upright.
+
+    The height is left to the pressing.
+    """
+    description = cell.product.parts[part]
+    R_WP = upright(cell.product.up, placement.yaw) @ description.X_AP.rotation()
+    x, y, _ = placement.X_WP.translation()
+    return RigidTransform(R_WP, [x, y, cell.X_WJ.translation()[2]])
+
+
+def placement_errors(planned: RigidTransform, placed: RigidTransform) -> dict[str, float]:
+    """Return the horizontal distance [m], the angle and the tilt [rad] between plan and outcome."""
+    X_PlanP = planned.InvertAndCompose(placed)
+    offset = placed.translation() - planned.translation()
+    # The vertical of W, seen from both: their angle is the tilt, whatever the yaw.
+    tilt = (planned.rotation().inverse().matrix()[:, 2]) @ (placed.rotation().matrix().T[:, 2])
+    return {
+        "position_error_m": float(np.hypot(offset[0], offset[1])),
+        "angle_error_rad": float(abs(X_PlanP.rotation().ToAngleAxis().angle())),
+        "upright_tilt_rad": float(np.arccos(np.clip(tilt, -1.0, 1.0))),
+    }
+
+
+def moved_placement(station: Station, part: str, up: str, X_WP: RigidTransform) -> Placement:
+    """Return the placement of a part that has come to lie at a pose: upright over that place."""
+    description = station.part(part)
+    R_turn = X_WP.rotation() @ description.X_AP.rotation().inverse() @ upright(up, 0.0).inverse()
+    yaw = float(np.arctan2(R_turn.matrix()[1, 0], R_turn.matrix()[0, 0]))
+    meant = station.placements[part]
+    hover = pose_on_jig(station, part, up, yaw, station.cell.fixture.entry_height + HOVER)
+    away = X_WP @ description.mesh.center_mass - hover @ description.mesh.center_mass
+    shift = RigidTransform([away[0], away[1], 0.0])
+    return Placement(yaw, shift @ hover, meant.q)
+
+
+def can_bring(station: Station, part: str, later: Sequence[str], X_WP: RigidTransform) -> bool:
+    """Return whether every later part can be brought to a part that lies at a pose."""
+    X_WA = X_WP @ station.part(part).X_AP.inverse()
+    return all(_mates(station, name, part, X_WA) for name in later)
+
+
 def choose_placement(
     station: Station,
     part: str,
@@ -102,9 +145,8 @@ def choose_placement(
     yaws = _yaws(station, part, up)
     for yaw, X_WP, q in _placeable(station, part, up, reach, top + HOVER, yaws):
         X_WSeated = seated(station, part, X_WP)
-        X_WA = X_WSeated @ station.part(part).X_AP.inverse()
-        leaves = _leaves(station, reach, X_WSeated @ reach.grasp.X_PJaw, q)
-        mates = all(_mates(station, name, X_WA) for name in later)
+        leaves = _leaves(station, part, reach, X_WSeated @ reach.grasp.X_PJaw, q)
+        mates = can_bring(station, part, later, X_WSeated)
         if leaves and mates and suits(X_WSeated):
             return Placement(yaw, X_WP, q)
     X_WJaw = pose_on_jig(station, part, up, 0.0, top + HOVER) @ reach.grasp.X_PJaw
@@ -162,12 +204,19 @@ def _placeable(
         yield yaw, X_WP, q
 
 
-def _leaves(station: Station, reach: Reach, X_WJaw: RigidTransform, q: np.ndarray) -> bool:
-    """Return whether the hand can back off straight from a jaw pose, with joints near ``q``."""
+def _leaves(
+    station: Station, part: str, reach: Reach, X_WJaw: RigidTransform, q: np.ndarray
+) -> bool:
+    """Return whether the hand can press at a jaw pose and back off, with joints near ``q``.
+
+    Beside the fixture, which gives way, it keeps clear of everything down there.
+    """
     arm, context = station.holder, station.context
     frame = arm.frame(reach.grasp.jaw)
+    may_touch = [(station.hand, FIXTURE), (station.hand, "held"), ("held", "*")]
+    may_touch.append((station.hand, part))
     try:
-        for q_at in arm.configurations(context, frame, X_WJaw, q)[:1]:
+        for q_at in station.configurations(arm, frame, X_WJaw, q, may_touch)[:1]:
             plan_line(arm, context, frame, q_at, backed_off(X_WJaw, RETREAT))
             return True
     except (Unreachable, NoPath):
@@ -175,8 +224,12 @@ def _leaves(station: Station, reach: Reach, X_WJaw: RigidTransform, q: np.ndarra
     return False
 
 
-def _mates(station: Station, part: str, X_WA: RigidTransform) -> bool:
-    """Return whether every grasp of a part that is meant for it is reachable where it ends up."""
+def _mates(station: Station, part: str, onto: str, X_WA: RigidTransform) -> bool:
+    """Return whether every grasp of a part that is meant for it is reachable where it ends up.
+
+    What it is to come onto may be there already: how close the hand comes to it is seen when
+    the part is brought.
+    """
     description, arm = station.part(part), station.holder
     X_WP = X_WA @ description.X_AP
     # Grasps that differ only by a turn share the first part of their name.
@@ -186,6 +239,6 @@ def _mates(station: Station, part: str, X_WA: RigidTransform) -> bool:
         family = base if turn.isdigit() else grasp.name
         if not families.get(family):
             X_WJaw, frame = X_WP @ grasp.X_PJaw, arm.frame(grasp.jaw)
-            touch = [(station.hand, part)]
+            touch = [(station.hand, part), (station.hand, onto)]
             families[family] = bool(station.configurations(arm, frame, X_WJaw, arm.home, touch))
     return all(families.values())

@@ -27,6 +27,7 @@ UNFELT = 0.2  # Share of a force under which it is not taken for that force [A].
 ANY_OVERLAP = -1.0  # As a clearance: parts and surroundings are not checked [m].
 FIXTURE = "jig_base"  # The model instance that carries the fixture.
 SAVED = "station/"  # Before the names in a saved state.
+TUPLES = ("riders", "fixed", "driven", "recoveries")  # Of texts.
 
 
 @dataclass(frozen=True)
@@ -62,6 +63,7 @@ class Station:
         riders: Names of the parts that lie loose on the one in the hand.
         fixed: Names of the parts that the fixture holds, with what has been mated to them.
         driven: Names of the bolts that the driver has run into their threads.
+        recoveries: What did not come out as planned, and what was done about it, in words.
         origins: By name of a part, the pose X_WP from which it was taken to the fixture.
         placements: By name of a part, where on the fixture it was meant to go.
         held_opening: Opening of the tip pads when it was gripped [m].
@@ -80,6 +82,7 @@ class Station:
     riders: tuple[str, ...] = ()
     fixed: tuple[str, ...] = ()
     driven: tuple[str, ...] = ()
+    recoveries: tuple[str, ...] = ()
     origins: dict[str, RigidTransform] = field(default_factory=dict)
     placements: dict[str, Placement] = field(default_factory=dict)
     held_opening: float = 0.0
@@ -121,9 +124,13 @@ class Station:
         """Names of the part in the hand and of what rides on it."""
         return () if self.held is None else (self.held, *self.riders)
 
-    def look(self, *parts: str) -> None:
-        """Refresh the belief about some parts, or about all; everything must stand still."""
-        self.belief.look(parts or [part.part.name for part in self.cell.parts])
+    def look(self, *parts: str) -> frozenset[str]:
+        """Refresh the belief about some parts, or about all; everything must stand still.
+
+        Returns:
+            The names of those that were seen.
+        """
+        return self.belief.look(parts or [part.part.name for part in self.cell.parts])
 
     def pose_of(self, part: str) -> RigidTransform:
         """Return the believed pose X_WP of a part."""
@@ -324,7 +331,7 @@ class Station:
         """Return everything that the planner remembers, as named arrays."""
         state: State = {f"belief/{name}": value for name, value in self.belief.save().items()}
         state["held"] = np.array(self.held or "", dtype=str)
-        for name in ("riders", "fixed", "driven"):
+        for name in TUPLES:
             state[name] = np.array(getattr(self, name), dtype=str)
         state["held_opening"], state["calls"] = np.array(self.held_opening), np.array(self._calls)
         for name, X_WP in self.origins.items():
@@ -340,7 +347,7 @@ class Station:
         own = _below(state, SAVED)
         self.belief.restore(_below(own, "belief/"))
         self.held = str(own["held"]) or None
-        for name in ("riders", "fixed", "driven"):
+        for name in TUPLES:
             setattr(self, name, tuple(str(part) for part in own[name]))
         self.held_opening, self._calls = float(own["held_opening"]), int(own["calls"])
         self.origins = {n: RigidTransform(X_WP) for n, X_WP in _below(own, "origin/").items()}

@@ -9,10 +9,11 @@ from __future__ import annotations
 import ast
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from pydrake.math import RigidTransform, RollPitchYaw
+from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context
 
 from cell.builder import Cell
@@ -21,6 +22,7 @@ from cell.workpieces.parts import Parts
 
 State = dict[str, np.ndarray]
 SEEN, CARRIED, SOURCE = "seen/", "carried/", "source"  # Keys of a saved belief.
+NEVER = -np.inf  # Time of an estimate that no look has confirmed [s].
 
 
 @dataclass(frozen=True)
@@ -31,7 +33,7 @@ class Estimate:
         X_WP: Its pose.
         covariance: (6, 6) of the error: turns about the axes of P [rad2], then offsets along the
             axes of W [m2].
-        time: When it was seen [s].
+        time: When it was seen [s]; `NEVER` for what is only expected.
     """
 
     X_WP: RigidTransform
@@ -48,8 +50,13 @@ class Source(Protocol):
 
     duration: float
 
-    def look(self, parts: Sequence[str]) -> Mapping[str, Estimate]:
-        """Return where parts are now, by name; a part that is not seen is left out."""
+    def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> Mapping[str, Estimate]:
+        """Return where parts are now, by name; a part that is not seen is left out.
+
+        Args:
+            parts: Names of those that are asked for; what else is seen may be returned, too.
+            known: What is believed at present, to start from.
+        """
         ...
 
     def save(self) -> np.ndarray:
@@ -58,6 +65,34 @@ class Source(Protocol):
 
     def restore(self, state: np.ndarray) -> None:
         """Return to a saved state."""
+
+
+@runtime_checkable
+class CarriedSource(Source, Protocol):
+    """A source that the hand carries to where it sees from: it sees what it has taken since.
+
+    Attributes:
+        frame: Its optical frame C on the hand: z ahead.
+    """
+
+    frame: Frame
+
+    def targets(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> list[np.ndarray]:
+        """Return the points p_W (3,) to look at [m], each from a few sides, to see parts."""
+        ...
+
+    def take(self) -> None:
+        """Take in what is in sight now; everything stands still."""
+
+
+def random_state(rng: np.random.Generator) -> np.ndarray:
+    """Return the state of a random generator as a text, for saving."""
+    return np.array(repr(rng.bit_generator.state))
+
+
+def restore_random_state(rng: np.random.Generator, state: np.ndarray) -> None:
+    """Return a random generator to a state of `random_state`."""
+    rng.bit_generator.state = ast.literal_eval(str(state))
 
 
 @dataclass
@@ -98,7 +133,7 @@ class TruthSource:
             np.random.default_rng(seed),
         )
 
-    def look(self, parts: Sequence[str]) -> dict[str, Estimate]:
+    def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
         """Return where parts are now, each with noise of its own."""
         sigma = np.repeat([self.angle_noise, self.position_noise], 3)
         time = self.context.get_time()
@@ -114,11 +149,11 @@ class TruthSource:
 
     def save(self) -> np.ndarray:
         """Return the state of the random generator."""
-        return np.array(repr(self.rng.bit_generator.state))
+        return random_state(self.rng)
 
     def restore(self, state: np.ndarray) -> None:
         """Return to a saved state of the random generator."""
-        self.rng.bit_generator.state = ast.literal_eval(str(state))
+        restore_random_state(self.rng, state)
 
 
 @dataclass
@@ -137,16 +172,28 @@ class Belief:
     estimates: dict[str, Estimate] = field(default_factory=dict)
     carried: dict[str, RigidTransform] = field(default_factory=dict)
 
-    def look(self, parts: Sequence[str]) -> None:
-        """Replace what is known of parts by what is seen of them now."""
-        seen = self.source.look(parts)
+    def look(self, parts: Sequence[str]) -> frozenset[str]:
+        """Replace what is known of parts by what is seen now; return the names of those seen."""
+        seen = self.source.look(parts, self.now)
         self.estimates.update(seen)
         for name in self.carried.keys() & seen.keys():
             self.carried[name] = self.hand()
+        return frozenset(seen)
+
+    @property
+    def now(self) -> dict[str, Estimate]:
+        """The estimates, with what is in the hand where that is now."""
+        held = self.carried.keys() & self.estimates.keys()
+        moved = {name: replace(self.estimates[name], X_WP=self.pose(name)) for name in held}
+        return self.estimates | moved
 
     def suppose(self, part: str, X_WP: RigidTransform) -> None:
         """Believe a part to be at a pose without having looked."""
-        self.estimates[part] = Estimate(X_WP, np.zeros((6, 6)), 0.0)
+        self.estimates[part] = Estimate(X_WP, np.zeros((6, 6)), NEVER)
+
+    def rest(self, part: str, X_WP: RigidTransform) -> None:
+        """Believe a part that has been seen to have come to rest in a place that holds it."""
+        self.estimates[part] = replace(self.estimates[part], X_WP=X_WP)
 
     def pose(self, part: str) -> RigidTransform:
         """Return the believed pose X_WP of a part now.

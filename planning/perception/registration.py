@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from itertools import product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,6 +39,8 @@ SHIFTS = tuple(
     np.array(shift) for shift in ((4e-3, 0, 0), (-4e-3, 0, 0), (0, 4e-3, 0), (0, -4e-3, 0))
 )
 KEPT = 2  # Of all.
+LEVELS = (-2.0, -1.0, 0.0, 1.0, 2.0)  # Of `starts_within`, in standard deviations.
+CERTAIN = (*(np.deg2rad(0.5),) * 3, *(1e-3,) * 3)  # What is known better needs no start [rad, m].
 REACH, LEAST_REACH, SHRINK = 4e-3, 1.2e-3, 0.8  # Of a pair at first and at last [m], per round.
 LOSS = 6e-4  # Distances beyond this lose their weight [m]: 1.5 of a D435's at 0.32 m.
 ROUNDS = 40
@@ -101,20 +104,46 @@ def views_of(
     return views
 
 
-def register(surface: Surface, views: Sequence[View], X_WP: RigidTransform) -> Registration | None:
+def starts_within(X_WP: RigidTransform, covariance: Array) -> list[RigidTransform]:
+    """Return poses up to two standard deviations away along all axes that are uncertain.
+
+    A large part, seen from nearly above, is found from a few millimetres and degrees around only.
+
+    Args:
+        X_WP: Believed pose.
+        covariance: (6, 6) of its error; what correlates is not looked at.
+    """
+    sigma = np.sqrt(np.diag(covariance))
+    axes = [LEVELS if s > least else (0.0,) for s, least in zip(sigma, CERTAIN, strict=True)]
+    starts = []
+    for levels in product(*axes):
+        step = np.array(levels) * sigma
+        turn = RotationMatrix(Rotation.from_rotvec(step[:3]).as_matrix())
+        shift = RigidTransform(step[3:])
+        starts.append(shift @ X_WP @ RigidTransform(turn, np.zeros(3)))
+    return starts
+
+
+def register(
+    surface: Surface,
+    views: Sequence[View],
+    X_WP: RigidTransform,
+    more: Iterable[RigidTransform] = (),
+) -> Registration | None:
     """Return the pose that fits the views best, or None if they show too little of the part.
 
     Args:
         surface: Of the part.
         views: At least one.
         X_WP: Believed pose: the start.
+        more: Further starts.
     """
     sides = Sides(surface)
     few = [View(view.points[::THIN], view.p_WC) for view in views]
     centre = RigidTransform(X_WP @ surface.centre)
     turns = (RotationMatrix(Rotation.from_rotvec(t).as_matrix()) for t in np.deg2rad(STARTS_DEG))
     turned = [centre @ RigidTransform(R, np.zeros(3)) @ centre.inverse() @ X_WP for R in turns]
-    tried = _best(sides, few, turned, FEWEST // THIN)
+    tried = _best(sides, few, [*turned, *more], FEWEST // THIN)
     if not tried:
         return None
     shifted = [RigidTransform(shift) @ tried[0].X_WP for shift in SHIFTS]

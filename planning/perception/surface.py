@@ -7,7 +7,12 @@ from dataclasses import dataclass, field
 import numpy as np
 import trimesh
 from numpy.typing import NDArray
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
 from scipy.spatial import KDTree
+
+from cell.paths import model_url, new_parser
+from cell.shapes import shape_mesh
 
 Array = NDArray[np.float64]
 
@@ -39,6 +44,31 @@ class Surface:
         points, faces = trimesh.sample.sample_surface(mesh, count, seed=0)[:2]
         lower, upper = mesh.bounds
         return Surface(np.array(points), np.array(mesh.face_normals[faces]), lower, upper)
+
+    @staticmethod
+    def of_model(model: str) -> Surface:
+        """Return the surface of what is visible of an SDF model with one body, in its frame.
+
+        Args:
+            model: Name or URL, as `cell.paths.model_url` takes it.
+        """
+        builder = DiagramBuilder()
+        plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+        (instance,) = new_parser(plant, model).AddModelsFromUrl(model_url(model))
+        body = plant.get_body(plant.GetBodyIndices(instance)[0])
+        inspector, meshes = scene_graph.model_inspector(), []
+        for geometry in plant.GetVisualGeometriesForBody(body):
+            mesh = shape_mesh(inspector.GetShape(geometry))
+            mesh.apply_transform(inspector.GetPoseInFrame(geometry).GetAsMatrix4())
+            meshes.append(mesh)
+        whole = trimesh.util.concatenate(meshes)
+        assert isinstance(whole, trimesh.Trimesh)
+        return Surface.of(whole)
+
+    @property
+    def size(self) -> float:
+        """Diagonal of the bounding box [m]."""
+        return float(np.linalg.norm(self.upper - self.lower))
 
     @property
     def centre(self) -> Array:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.machines.cameras.pinhole import looking_at
 
@@ -11,6 +13,11 @@ from cell.machines.cameras.pinhole import looking_at
 # grows with the square of the distance, exceeds half a millimetre.
 DISTANCE = 0.28
 ELEVATIONS_DEG = (50.0, 75.0)  # From steep enough to see over the bag's rim to short of vertical.
+
+
+# Of a sector, in the order in which they are tried [deg] [A].
+SECTOR_AZIMUTHS_DEG, SECTOR_ELEVATIONS_DEG = (0.0, -30.0, 30.0), (60.0, 75.0, 50.0)
+ROLLS_DEG = (0.0, 90.0, 180.0, 270.0)  # An image may stand on its head: the wrist chooses.
 
 
 def viewpoints(p_WTarget: np.ndarray, count: int, rng: np.random.Generator) -> list[RigidTransform]:
@@ -26,7 +33,30 @@ def viewpoints(p_WTarget: np.ndarray, count: int, rng: np.random.Generator) -> l
     for k in range(count):
         azimuth = first + 2.0 * np.pi * k / count
         elevation = np.deg2rad(rng.uniform(*ELEVATIONS_DEG))
-        across = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
-        ray = across + np.array([0.0, 0.0, np.sin(elevation)])
-        poses.append(looking_at(p_WTarget + DISTANCE * ray, p_WTarget))
+        poses.append(_from(p_WTarget, azimuth, elevation))
     return poses
+
+
+def sector(p_WTarget: np.ndarray, azimuth: float) -> Iterator[list[RigidTransform]]:
+    """Yield groups of poses X_WC that look at a point from about one side, the best group first.
+
+    Those of a group differ in elevation, and in how the camera is turned about its axis.
+
+    Args:
+        p_WTarget: (3,) [m].
+        azimuth: Of the side [rad].
+    """
+    rolls = [RotationMatrix.MakeZRotation(roll) for roll in np.deg2rad(ROLLS_DEG)]
+    for aside in np.deg2rad(SECTOR_AZIMUTHS_DEG):
+        poses = [
+            _from(p_WTarget, azimuth + aside, elevation)
+            for elevation in np.deg2rad(SECTOR_ELEVATIONS_DEG)
+        ]
+        yield [X_WC @ RigidTransform(R, np.zeros(3)) for X_WC in poses for R in rolls]
+
+
+def _from(p_WTarget: np.ndarray, azimuth: float, elevation: float) -> RigidTransform:
+    """Return the pose X_WC of an upright camera that looks at a point from an angle [rad]."""
+    across = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
+    ray = across + np.array([0.0, 0.0, np.sin(elevation)])
+    return looking_at(p_WTarget + DISTANCE * ray, p_WTarget)

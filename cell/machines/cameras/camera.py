@@ -66,6 +66,27 @@ class Picture:
 
 
 @dataclass(frozen=True)
+class FixedView:
+    """What a camera that stands still projects by.
+
+    Attributes:
+        X_WC: Where it is.
+        pinhole: Its geometry.
+    """
+
+    X_WC: RigidTransform
+    pinhole: Pinhole
+
+    @staticmethod
+    def above(X_WJ: RigidTransform, config: CameraConfig) -> FixedView:
+        """Return the view straight down on a jig that stands at a pose."""
+        down = RotationMatrix.MakeXRotation(np.pi)
+        p_WC = X_WJ.translation() + np.array([0.0, 0.0, config.height_above_jig])
+        pinhole = Pinhole.centred(config.width, config.height, config.focal_length)
+        return FixedView(RigidTransform(down, p_WC), pinhole)
+
+
+@dataclass(frozen=True)
 class Camera:
     """A camera in the cell.
 
@@ -154,7 +175,7 @@ def cameras_of(
         X_WJ: Where the jig stands.
         config: Of the cameras.
     """
-    pinhole = Pinhole.centred(config.width, config.height, config.focal_length)
+    above = FixedView.above(X_WJ, config)
     stereo = StereoDepth(
         focal_length=config.focal_length,
         baseline=config.baseline,
@@ -165,12 +186,10 @@ def cameras_of(
         edge_loss=config.edge_loss,
         dropouts=config.dropouts,
     )
-    down = RotationMatrix.MakeXRotation(np.pi)
-    p_WC = X_WJ.translation() + np.array([0.0, 0.0, config.height_above_jig])
-    places = {ABOVE: (plant.world_body(), RigidTransform(down, p_WC))}
-    if config.mounted:
+    places = {ABOVE: (plant.world_body(), above.X_WC)}
+    if plant.HasBodyNamed(HAND_EYE):
         places[HAND_EYE] = (plant.GetBodyByName(HAND_EYE), RigidTransform())
     return {
-        name: Camera(name, plant, scene_graph, body, X_BC, pinhole, stereo)
+        name: Camera(name, plant, scene_graph, body, X_BC, above.pinhole, stereo)
         for name, (body, X_BC) in places.items()
     }

@@ -3,7 +3,8 @@
 from planning.operations.operation import Operation, Role, Scene, Step
 from planning.operations.pick_place.limits import LIMITS
 from planning.operations.pick_place.measures import measure
-from planning.operations.pick_place.phases import carry_out, foresee
+from planning.operations.pick_place.phases import foresee
+from planning.operations.pick_place.recovery import carry_out
 
 
 def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import numpy as np
-from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from planning.operations.grasping import HandPhase
 from planning.operations.log_rows import logged_poses, logged_speed, rows_of
 from planning.operations.operation import Arrays, Measured, PhaseRecord, StepRecord
 from planning.operations.pick_place.phases import PlacePhase
-from planning.operations.placement import upright
+from planning.operations.placement import placement_errors, planned_pose
 from planning.operations.snapshot import Snapshot
 
 # What throws a part, by the name that its kick is measured under.
@@ -28,35 +27,11 @@ def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:
             measured |= _kick(cell, part, name, found, log)
     if record.placement is not None and (settle := record.of(part, PlacePhase.SETTLE)):
         end = settle[0].end
-        planned = planned_pose(cell, part, record.placement.yaw)
+        planned = planned_pose(cell, part, record.placement)
         measured |= placement_errors(planned, end.X_WP[part])
         measured["depth_m"] = _depth(cell, part, end)
         measured["speed_after_1_s_m_per_s"] = float(np.linalg.norm(end.V_WP[part][3:]))
     return measured
-
-
-def planned_pose(cell: Cell, part: str, yaw: float) -> RigidTransform:
-    """Return where the plan puts a part: its centre of mass over the jig's centre, upright.
-
-    The height is left to the pressing.
-    """
-    product = cell.product
-    R_WP = upright(product.up, yaw) @ product.parts[part].X_AP.rotation()
-    centre = R_WP @ product.parts[part].mesh.center_mass
-    return RigidTransform(R_WP, cell.X_WJ.translation() - [centre[0], centre[1], 0.0])
-
-
-def placement_errors(planned: RigidTransform, placed: RigidTransform) -> Measured:
-    """Return the horizontal distance, the angle and the tilt between plan and outcome."""
-    X_PlanP = planned.InvertAndCompose(placed)
-    offset = placed.translation() - planned.translation()
-    # The vertical of W, seen from both: their angle is the tilt, whatever the yaw.
-    tilt = (planned.rotation().inverse().matrix()[:, 2]) @ (placed.rotation().matrix().T[:, 2])
-    return {
-        "position_error_m": float(np.hypot(offset[0], offset[1])),
-        "angle_error_rad": float(abs(X_PlanP.rotation().ToAngleAxis().angle())),
-        "upright_tilt_rad": float(np.arccos(np.clip(tilt, -1.0, 1.0))),
-    }
 
 
 def _kick(cell: Cell, part: str, name: str, phases: list[PhaseRecord], log: Arrays) -> Measured:

@@ -61,21 +61,15 @@ class PlacePhase(Enum):
     FIX = "jam"
     SETTLE = "settle"
     LOOK_AGAIN = "look again"
-
-
-def carry_out(station: Station, step: Step) -> Iterator[Phase]:
-    """Yield the phases of a step: the part upright, and so that later parts can be brought."""
-    (part,) = step.parts
-    product = station.cell.product
-    yield from pick_place(station, part, product.up, brought_to(product, part))
-    yield from look(station, PlacePhase.LOOK_AGAIN, part)
+    FREE = "vent"
+    READY = "inflate"
 
 
 def foresee(station: Station, step: Step) -> tuple[str, ...]:
     """Choose grasp and place of a part, and believe it to stand there."""
     (part,) = step.parts
     product = station.cell.product
-    _, placement = _choose(station, part, product.up, brought_to(product, part), anywhere)
+    _, placement = choose(station, part, product.up, brought_to(product, part), anywhere)
     station.origins[part] = station.pose_of(part)
     station.belief.suppose(part, seated(station, part, placement.X_WP))
     return ()
@@ -91,7 +85,7 @@ def can_place(station: Station, part: str) -> bool:
     """Return whether a part can be put on the fixture, and later parts be brought to it there."""
     product = station.cell.product
     try:
-        _choose(station, part, product.up, brought_to(product, part), anywhere)
+        choose(station, part, product.up, brought_to(product, part), anywhere)
     except Unreachable:
         return False
     return True
@@ -113,14 +107,33 @@ def pick_place(
         later: Names of the parts that will be mated with it: its yaw must suit them.
         suits: Whether its pose on the fixture suits whatever else comes later.
     """
-    arm, awake = station.holder, frozenset([part])
+    awake = frozenset([part])
     yield from look(
-        station, PlacePhase.LOOK, part, settle=LOOK_TIME, start=(prepare_fixture,), awake=awake
+        station,
+        PlacePhase.LOOK,
+        part,
+        closely=(part,),
+        settle=LOOK_TIME,
+        start=(prepare_fixture,),
+        awake=awake,
     )
     station.origins[part] = station.pose_of(part)
-    reach, placement = _choose(station, part, up, later, suits)
+    reach, placement = choose(station, part, up, later, suits)
     station.placements[part] = placement
     yield from take(station, part, reach, LIFT)
+    yield from put(station, part, reach, placement)
+
+
+def put(station: Station, part: str, reach: Reach, placement: Placement) -> Iterator[Phase]:
+    """Yield the phases that bring a part in the hand to the fixture, fix it and let it go.
+
+    Args:
+        station: The planner's view of the cell.
+        part: Name of the part.
+        reach: How it is held.
+        placement: Where it goes.
+    """
+    arm, awake = station.holder, frozenset([part])
     holding, frame = lost_grasp(station), arm.frame(reach.grasp.jaw)
     X_WJaw = placement.X_WP @ jaw_to_part(station, part, reach.grasp).inverse()
     may_touch = [("held", FIXTURE)]
@@ -175,7 +188,7 @@ def pick_place(
     yield Phase(PlacePhase.SETTLE, after(SETTLE_TIME), timeout=2.0, subject=part, awake=awake)
 
 
-def _choose(
+def choose(
     station: Station, part: str, up: str, later: tuple[str, ...], suits: Suits
 ) -> tuple[Reach, Placement]:
     """Return the first grasp with a placement, grasps from above first."""

@@ -60,7 +60,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
     arm = station.holder
     X_WGoal, riding = station.origins[part], frozenset(riders)
     awake = riding | {part}
-    yield from look(station, AsidePhase.LOOK, part)
+    yield from look(station, AsidePhase.LOOK, part, closely=(part,))
     reach = first(_useful(station, part, X_WGoal), part, station)
     yield from seize(station, part, reach, riders)
     holding, jaw = lost_grasp(station), arm.frame(reach.grasp.jaw)

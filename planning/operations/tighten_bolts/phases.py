@@ -150,7 +150,7 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     clamped = station.cell.product.screws[step.parts[0]].clamps
     assembly = frozenset([*station.fixed, *step.parts])
     order = star_order(station, step.parts)
-    yield from look(station, DrivePhase.LOOK, clamped)
+    yield from look(station, DrivePhase.LOOK, clamped, closely=(clamped,))
 
     def meanwhile(coming: Coming) -> dict[str, Command]:
         return come_beside(station, order[0], coming)

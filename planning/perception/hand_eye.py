@@ -1,0 +1,169 @@
+"""The depth camera on the hand as a perception source.
+
+The hand carries it round what is to be seen; from the depth images of all sides together every part
+is registered against its mesh, from where it is believed to be. Parts that nothing has been seen of
+yet are taken to be in the tray: the tray is registered first, as one large part, and every part is
+expected in its place there. For parts that are too small for the camera, such as bolts, that is all
+that is known: a place in a rack whose pose has been seen.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+from pydrake.multibody.tree import Frame
+from pydrake.systems.framework import Context
+
+from cell.builder import Cell
+from cell.configuration.config import CellConfig
+from cell.machines.cameras.camera import HAND_EYE, Camera, Picture
+from cell.products.product import Product
+from planning.perception.belief import NEVER, Estimate, random_state, restore_random_state
+from planning.perception.layout import parts_in_tray, tray_expected
+from planning.perception.registration import register, starts_within, views_of
+from planning.perception.surface import Surface
+
+Array = NDArray[np.float64]
+
+# Diagonal of the smallest part that is registered [m] [M]: of an M3 screw, 13 mm long, a view from
+# 0.28 m shows 8 by 8 pixels; its registered pose is off by 1 to 2 mm, its rack's by 0.1.
+SMALLEST = 0.02
+TOGETHER = 0.06  # Parts no further apart are looked at together [m] [A].
+# Least share of the points near a part that have a partner on it [M]: 0.8 and more if it is found,
+# 0.6 for the tray with its parts, 0.2 where there is something else.
+SHARE = 0.4
+NEST = 2e-3  # A part further from its place in the tray is not there, or that is not the tray [m].
+
+
+@dataclass
+class HandEye:
+    """See the module.
+
+    Attributes:
+        camera: On the hand.
+        root: Context of the diagram that is rendered.
+        product: Its parts, and the tray.
+        tray: Where that is expected.
+        rng: Of the depth noise.
+        duration: See `planning.perception.belief.Source`; the hand stands still by itself.
+        pictures: Taken since the latest look.
+    """
+
+    camera: Camera
+    root: Context
+    product: Product
+    tray: Estimate
+    rng: np.random.Generator
+    duration: float = 0.0
+    pictures: list[Picture] = field(default_factory=list)
+    _surfaces: dict[str, Surface] = field(default_factory=dict)
+    _tray_model: Surface | None = None
+
+    @staticmethod
+    def of(cell: Cell, root: Context, config: CellConfig, seed: int) -> HandEye:
+        """Return the source of a cell.
+
+        Args:
+            cell: The cell.
+            root: Context of its diagram.
+            config: What the planner believes the cell to be.
+            seed: Of the depth noise.
+        """
+        rng = np.random.default_rng([seed, 2])
+        return HandEye(cell.cameras[HAND_EYE], root, cell.product, tray_expected(config), rng)
+
+    @property
+    def frame(self) -> Frame:
+        """The camera's frame C: z ahead."""
+        return self.camera.body.body_frame()
+
+    def targets(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> list[Array]:
+        """Return the points p_W (3,) to look at to see parts: one for those that are together."""
+        groups: list[list[Array]] = []
+        for name in parts:
+            if known[name].time == NEVER and self.product.tray is not None:
+                middle = self.tray.X_WP @ self._tray_surface.centre
+            else:
+                middle = known[name].X_WP @ self._surface(name).centre
+            near = (g for g in groups if np.linalg.norm(np.mean(g, axis=0) - middle) < TOGETHER)
+            group = next(near, None)
+            if group is None:
+                groups.append([middle])
+            else:
+                group.append(middle)
+        return [np.mean(group, axis=0) for group in groups]
+
+    def take(self) -> None:
+        """Take a picture."""
+        self.pictures.append(self.camera.take(self.root, self.rng))
+
+    def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
+        """Return what the pictures since the latest look show; without any, nothing."""
+        pictures, self.pictures = self.pictures, []
+        if not pictures:
+            return {}
+        seen = self._in_tray(pictures, known)
+        for name in parts:
+            surface = self._surface(name)
+            if surface.size >= SMALLEST:
+                prior = {**known, **seen}[name]
+                found = self._registered(surface, pictures, prior)
+                if found is not None and name in seen and _apart(found, seen[name]) > NEST:
+                    return {}  # One of the two is wrong.
+                seen.pop(name, None)
+                if found is not None:
+                    seen[name] = found
+        return seen
+
+    def _in_tray(
+        self, pictures: Sequence[Picture], known: Mapping[str, Estimate]
+    ) -> dict[str, Estimate]:
+        """Return where the parts are that were only expected so far, by the tray that is seen."""
+        unseen = [name for name, estimate in known.items() if estimate.time == NEVER]
+        if not unseen or self.product.tray is None:
+            return {}
+        tray = self._registered(self._tray_surface, pictures, self.tray)
+        if tray is None:
+            return {}
+        places = parts_in_tray(self.product, tray)
+        return {name: places[name] for name in unseen}
+
+    def _registered(
+        self, surface: Surface, pictures: Sequence[Picture], prior: Estimate
+    ) -> Estimate | None:
+        """Return the estimate of what has a surface, None if it is not there."""
+        views = views_of(pictures, surface, prior.X_WP, self.rng)
+        more = starts_within(prior.X_WP, prior.covariance) if prior.time == NEVER else ()
+        found = register(surface, views, prior.X_WP, more)
+        if found is None or found.share < SHARE:
+            return None
+        return Estimate(found.X_WP, found.covariance, pictures[-1].time)
+
+    def _surface(self, name: str) -> Surface:
+        if name not in self._surfaces:
+            self._surfaces[name] = Surface.of(self.product.parts[name].mesh)
+        return self._surfaces[name]
+
+    @property
+    def _tray_surface(self) -> Surface:
+        if self._tray_model is None:
+            assert self.product.tray is not None
+            self._tray_model = Surface.of_model(self.product.tray)
+        return self._tray_model
+
+    def save(self) -> np.ndarray:
+        """Return the state of the random generator; pictures do not outlive a look."""
+        return random_state(self.rng)
+
+    def restore(self, state: np.ndarray) -> None:
+        """Return to a saved state of the random generator."""
+        restore_random_state(self.rng, state)
+        self.pictures = []
+
+
+def _apart(one: Estimate, other: Estimate) -> float:
+    """Return the distance of two estimates [m]."""
+    return float(np.linalg.norm(one.X_WP.translation() - other.X_WP.translation()))
