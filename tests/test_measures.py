@@ -10,7 +10,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.builder import Cell
 from cell.products.loading import load_product
-from planning.operations.bolts import in_hole, standing
+from planning.operations.bolts import in_hole, play_share, screw_play, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.insert_shaft.phases import mating_of
@@ -115,6 +115,26 @@ def test_bolt_stands_on_the_mouth_of_its_thread() -> None:
     errors = standing(BOLT, X_HF)
     assert errors["standing_axial_m"] == pytest.approx(1e-4)
     assert errors["standing_lateral_m"] == pytest.approx(2e-4)
+
+
+def test_play_of_a_bolt_is_that_of_its_hole() -> None:
+    """[R] ISO 273, medium: M3 in 3.4 mm. The play is used up where the hole is off by as much."""
+    assert screw_play(PRODUCT, "bolt_1") == pytest.approx(2e-4, abs=1e-6)
+    assert play_share(PRODUCT, "plate", RigidTransform()) == pytest.approx(0.0, abs=1e-9)
+    assert play_share(PRODUCT, "plate", RigidTransform([1e-4, 0.0, 1e-3])) == pytest.approx(
+        0.5, 1e-2
+    )
+    assert play_share(PRODUCT, "motor", RigidTransform([1.0, 0.0, 0.0])) == 0.0
+
+
+def test_holes_far_from_the_axis_of_a_turn_are_off_the_most() -> None:
+    turned = RigidTransform(RollPitchYaw(0.0, 0.0, 1e-3), np.zeros(3))
+    X_AP = PRODUCT.parts["plate"].X_AP
+    far = max(
+        float(np.linalg.norm((X_AP.inverse() @ PRODUCT.parts[bolt].X_AP).translation()[:2]))
+        for bolt in PRODUCT.screws
+    )
+    assert play_share(PRODUCT, "plate", turned) == pytest.approx(1e-3 * far / 2e-4, rel=2e-2)
 
 
 def test_clamp_force_is_compared_with_the_nut_factor() -> None:

@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from cell.products.product import Product
-from planning.operations.bolts import standing
+from planning.operations.bolts import play_share, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.log_rows import logged_poses, rows_of
 from planning.operations.mating import SOFT, MatePhase, Mating
@@ -30,7 +30,9 @@ def measure_mating(cell: Cell, record: StepRecord, mating: Mating) -> Measured:
         gap, tilt, aside = seat_errors(cell.product, mating, record.end)
         measured |= {"gap_m": gap, "tilt_rad": tilt}
         if mating.depth == 0.0:
+            X_GoalP = _X_GoalP(cell.product, mating, *_poses(record.end, mating))
             measured["off_place_m"] = aside
+            measured["screw_play_share"] = play_share(cell.product, mating.part, X_GoalP)
         measured |= riders_standing(cell.product, record.step.riders, record.end)
     return measured | base_moved(record)
 
@@ -53,7 +55,7 @@ def seat_errors(product: Product, mating: Mating, snapshot: Snapshot) -> tuple[f
     Returns:
         Gap along the axis [m], tilt [rad], and distance across the axis [m].
     """
-    X_GoalP = _X_GoalP(product, mating, snapshot.X_WP[mating.on], snapshot.X_WP[mating.part])
+    X_GoalP = _X_GoalP(product, mating, *_poses(snapshot, mating))
     p_PC, axis = _centre(product, mating)
     off = X_GoalP @ p_PC - p_PC
     gap, cosine = float(axis @ off), float(axis @ (X_GoalP.rotation() @ axis))
@@ -79,6 +81,10 @@ def _centre(product: Product, mating: Mating) -> tuple[np.ndarray, np.ndarray]:
     """Return compliance centre and axis in the frame of the part in the hand."""
     X_PA = product.parts[mating.part].X_AP.inverse()
     return X_PA @ mating.p_AoC, X_PA.rotation() @ mating.axis
+
+
+def _poses(snapshot: Snapshot, mating: Mating) -> tuple[RigidTransform, RigidTransform]:
+    return snapshot.X_WP[mating.on], snapshot.X_WP[mating.part]
 
 
 def _X_GoalP(

@@ -17,6 +17,9 @@ from planning.product_draft.joint_guesses import LINE_TO_LINE, FitGuess, ScrewGu
 from planning.product_draft.recognised import Recognised
 
 DRIVER_TORQUE = 0.5  # [A] Of the driver: see `cell.machines.driver`, which stalls at 0.7 [N m].
+# [A] Screws on one part from which they are tightened in two passes: three set its plane, and those
+# that follow raise or relax the first; two pull it down evenly enough [M].
+TWO_PASSES = 3
 PRESS_FORCE = 100.0  # [A] Where CAD says nothing [N].
 
 
@@ -72,6 +75,7 @@ class Joining:
             what = f"tightened to {torque:.2g} N m with a {screw.head.drive} bit"
             self.guesses.append(Guess(screw.part, what, reason, 0.6))
         radius = self.contacts[screw.clamps].friction_radius[screw.clamped_hole]
+        beside = [other for other in self.seen.screws if other.clamps == screw.clamps]
         return Screw(
             part=screw.part,
             into=screw.into,
@@ -85,6 +89,7 @@ class Joining:
             friction_radius=radius,
             drive=Drive(screw.head.drive),
             bit_seat=screw.head_size[1] - 1e-3 * screw.head.engagement,
+            passes=2 if len(beside) >= TWO_PASSES else 1,
         )
 
     def _fit(self, fit: FitGuess, later: str) -> Joint:

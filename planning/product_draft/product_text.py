@@ -107,6 +107,7 @@ def _joint(joint: Joint, product: Product) -> Iterator[str]:
         yield f"    bit_seat_mm: {1e3 * joint.bit_seat:.4g}  # Its end above the head's underside."
         assert joint.friction_radius is not None
         yield f"    friction_radius_mm: {1e3 * joint.friction_radius:.6g}  # Of the contact model."
+        yield f"    passes: {joint.passes}  # 2: all to half the torque first, then to the whole."
     elif isinstance(joint, Fit | Press):
         yield f"  - type: {'press' if isinstance(joint, Press) else 'fit'}"
         yield f"    shaft: {_quoted(joint.shaft)}"
