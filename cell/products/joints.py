@@ -193,12 +193,15 @@ class Rest:
     Attributes:
         part: Name of the part that stands.
         on: Name of the part that it stands on.
+        depth: How far before its seat it enters what guides it, such as a lip its opening [m]; 0:
+            nothing does.
     """
 
-    keys: ClassVar[tuple[str, ...]] = ("part", "on")
+    keys: ClassVar[tuple[str, ...]] = ("part", "on", "depth_mm")
 
     part: str
     on: str
+    depth: float = 0.0
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -209,7 +212,8 @@ class Rest:
     def read(cls, entry: Fields, product: PartNames) -> Sequence[Rest]:
         """Return the joint that an entry describes; for a group, one for each of its members."""
         on = _part(entry, "on", product)
-        return [cls(part, on) for part in product.members(entry.text("part"))]
+        depth = entry.positive("depth_mm") * 1e-3 if "depth_mm" in entry else 0.0
+        return [cls(part, on, depth) for part in product.members(entry.text("part"))]
 
 
 Joint = Fit | Screw | Press | Rest
