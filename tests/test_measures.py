@@ -14,7 +14,7 @@ from planning.operations.bolts import in_hole, play_share, screw_play, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.insert_shaft.phases import mating_of
-from planning.operations.log_rows import rows_between
+from planning.operations.log_rows import rows_between, rows_of
 from planning.operations.mating_measures import riders_standing, seat_errors
 from planning.operations.measures import force_plate_peaks, moved
 from planning.operations.operation import PhaseRecord, Step, StepRecord
@@ -186,6 +186,20 @@ def test_peaks_of_the_force_plate_leave_out_the_weight_of_the_jig() -> None:
 def test_rows_of_an_interval_leave_out_its_start() -> None:
     log = {"time": np.array([0.1, 0.2, 0.3]), "phase_start": np.zeros(1)}
     assert rows_between(log, 0.1, 0.3)["time"].tolist() == [0.2, 0.3]
+
+
+def test_rows_of_phases_leave_out_what_is_between() -> None:
+    """Phases that follow each other give what the interval over both gives."""
+    log = {"time": np.arange(10) * 0.1, "phase_name": np.array(["a"])}
+
+    def phase(start: float, end: float) -> PhaseRecord:
+        return PhaseRecord(snapshot(time=start), snapshot(time=end), {})
+
+    apart = rows_of(log, [phase(0.1, 0.3), phase(0.6, 0.7)])
+    np.testing.assert_allclose(apart["time"], [0.2, 0.3, 0.7])
+    adjacent = rows_of(log, [phase(0.1, 0.3), phase(0.3, 0.5)])
+    np.testing.assert_array_equal(adjacent["time"], rows_between(log, 0.1, 0.5)["time"])
+    assert "phase_name" not in apart
 
 
 def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
