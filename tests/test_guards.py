@@ -30,7 +30,7 @@ from planning.motion.timing import JointMotion
 from planning.operations.grasping import LOST, HandPhase, check_lifted
 from planning.operations.mating import SOFT, TOO_MUCH
 from planning.operations.sequence import steps
-from planning.operations.tighten_bolts.phases import Clutch
+from planning.operations.tighten_bolts.servos import Clutch
 
 ORDER = ("plate", "bolts", "motor")  # Every operation of an assembly has a step in it.
 Seen = list[tuple[str, Phase, tuple[str, ...], float]]

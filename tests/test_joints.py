@@ -68,6 +68,15 @@ def test_a_bit_fits_in_as_many_ways_as_its_drive_has_sides(read) -> None:
         read(entry.replace("{}", "torx 10").replace("}}", "}"))
 
 
+def test_screws_are_tightened_in_one_pass_or_two(read) -> None:
+    entry = SCREW[:-1] + ", passes: {}}"
+    assert read(SCREW).joints[0].passes == 1
+    assert read(entry.replace("{}", "2")).joints[0].passes == 2
+    for wrong in ("3", "1.5", "-1"):
+        with pytest.raises(InputError, match="passes"):
+            read(entry.replace("{}", wrong))
+
+
 def test_fits_and_screws_are_views_of_the_joints(read) -> None:
     product = read(REST, FIT, SCREW, PRESS)
     assert product.fits == product.joints[1:2]

@@ -10,11 +10,11 @@ from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.builder import Cell
 from cell.products.loading import load_product
-from planning.operations.bolts import in_hole, standing
+from planning.operations.bolts import in_hole, play_share, screw_play, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.insert_shaft.phases import mating_of
-from planning.operations.log_rows import rows_between
+from planning.operations.log_rows import rows_between, rows_of
 from planning.operations.mating_measures import riders_standing, seat_errors
 from planning.operations.measures import force_plate_peaks, moved
 from planning.operations.operation import PhaseRecord, Step, StepRecord
@@ -117,6 +117,26 @@ def test_bolt_stands_on_the_mouth_of_its_thread() -> None:
     assert errors["standing_lateral_m"] == pytest.approx(2e-4)
 
 
+def test_play_of_a_bolt_is_that_of_its_hole() -> None:
+    """[R] ISO 273, medium: M3 in 3.4 mm. The play is used up where the hole is off by as much."""
+    assert screw_play(PRODUCT, "bolt_1") == pytest.approx(2e-4, abs=1e-6)
+    assert play_share(PRODUCT, "plate", RigidTransform()) == pytest.approx(0.0, abs=1e-9)
+    assert play_share(PRODUCT, "plate", RigidTransform([1e-4, 0.0, 1e-3])) == pytest.approx(
+        0.5, 1e-2
+    )
+    assert play_share(PRODUCT, "motor", RigidTransform([1.0, 0.0, 0.0])) == 0.0
+
+
+def test_holes_far_from_the_axis_of_a_turn_are_off_the_most() -> None:
+    turned = RigidTransform(RollPitchYaw(0.0, 0.0, 1e-3), np.zeros(3))
+    X_AP = PRODUCT.parts["plate"].X_AP
+    far = max(
+        float(np.linalg.norm((X_AP.inverse() @ PRODUCT.parts[bolt].X_AP).translation()[:2]))
+        for bolt in PRODUCT.screws
+    )
+    assert play_share(PRODUCT, "plate", turned) == pytest.approx(1e-3 * far / 2e-4, rel=2e-2)
+
+
 def test_clamp_force_is_compared_with_the_nut_factor() -> None:
     """0.5 N m on an M3 with K = 0.202 is 825 N."""
     assert clamp_target(BOLT) == pytest.approx(825.1, abs=0.1)
@@ -166,6 +186,20 @@ def test_peaks_of_the_force_plate_leave_out_the_weight_of_the_jig() -> None:
 def test_rows_of_an_interval_leave_out_its_start() -> None:
     log = {"time": np.array([0.1, 0.2, 0.3]), "phase_start": np.zeros(1)}
     assert rows_between(log, 0.1, 0.3)["time"].tolist() == [0.2, 0.3]
+
+
+def test_rows_of_phases_leave_out_what_is_between() -> None:
+    """Phases that follow each other give what the interval over both gives."""
+    log = {"time": np.arange(10) * 0.1, "phase_name": np.array(["a"])}
+
+    def phase(start: float, end: float) -> PhaseRecord:
+        return PhaseRecord(snapshot(time=start), snapshot(time=end), {})
+
+    apart = rows_of(log, [phase(0.1, 0.3), phase(0.6, 0.7)])
+    np.testing.assert_allclose(apart["time"], [0.2, 0.3, 0.7])
+    adjacent = rows_of(log, [phase(0.1, 0.3), phase(0.3, 0.5)])
+    np.testing.assert_array_equal(adjacent["time"], rows_between(log, 0.1, 0.5)["time"])
+    assert "phase_name" not in apart
 
 
 def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:

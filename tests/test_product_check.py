@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import numpy as np
@@ -17,6 +18,7 @@ from cell.products.loading import load_product
 from cell.products.product import Grasp, Part, Product
 from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
+from experiments.product.random_drawing import draw
 from planning.product_check.check import plan_findings
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
@@ -215,3 +217,15 @@ def test_covered_block_is_assembled_from_its_meshes(file: Path, tmp_path: Path) 
     """From four STL files to the last screw, with no edit by hand."""
     arguments = ["assemble", str(file), "--out", str(tmp_path), "--quiet"]
     assert main(arguments) == 0
+
+
+def test_products_drawn_at_random_are_whole_and_the_same_again() -> None:
+    """One body each; nothing overlaps but screws and their threads."""
+    for number in range(12):
+        drawing, again = (draw(np.random.default_rng(number)) for _ in range(2))
+        assert drawing.text == again.text
+        assert all(len(solid.decompose()) == 1 for solid in drawing.parts.values())
+        for one, other in combinations(drawing.parts, 2):
+            shared = (drawing.parts[one] ^ drawing.parts[other]).volume()
+            threaded = one == "block" and other.startswith("screw")
+            assert (shared > 1.0) if threaded else (shared < 1e-6), f"{number}: {one}, {other}"

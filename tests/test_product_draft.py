@@ -8,7 +8,15 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
-from drawn_products import covered_block, meshes, pinned_block, screw, write_meshes
+from drawn_products import (
+    box_with_lid,
+    covered_block,
+    gear_pair,
+    meshes,
+    pinned_block,
+    screw,
+    write_meshes,
+)
 from pydrake.geometry import Box
 
 from cell.cad.motor_unit import mesh
@@ -24,6 +32,7 @@ from cell.products.read_options import ReadOptions
 from cell.products.screw_table import NUT_FACTOR, SIZES, head_of, size_of
 from experiments.cli.main import main
 from planning.assembly_plan.planner import plan
+from planning.operations.operation import NoOperation
 from planning.operations.sequence import steps
 from planning.product_draft.depth_maps import DepthMaps
 from planning.product_draft.draft import Draft, DraftOptions, draft_product
@@ -295,6 +304,30 @@ def test_pinned_block_is_drafted_with_the_mouth_where_the_pin_enters(tmp_path: P
     assert fit.depth == pytest.approx(16 * MM, rel=1e-4)
     todo = steps(draft.product, plan(draft.product))
     assert [step.name for step in todo] == ["place block", "insert pin"]
+
+
+def test_a_lid_goes_in_with_its_lip_and_has_cross_recesses_and_two_passes(tmp_path: Path) -> None:
+    product = drafted(tmp_path, box_with_lid()).product
+    (rest,) = (joint for joint in product.joints if isinstance(joint, Rest))
+    assert (rest.part, rest.on) == ("lid", "box")
+    assert rest.depth == pytest.approx(3 * MM, abs=0.15 * MM)
+    for found in product.screws.values():
+        assert (found.thread, found.drive.name, found.passes) == ("M3", "cross 1", 2)
+
+
+def test_a_plate_from_the_side_is_refused(tmp_path: Path) -> None:
+    """In the best order the box comes to the plate: from the side, either way."""
+    product = drafted(tmp_path, box_with_lid(side_plate=True)).product
+    with pytest.raises(NoOperation, match="box leaves along .* no operation comes from the side"):
+        steps(product, plan(product))
+
+
+def test_gears_come_over_their_shafts_and_the_bridge_over_both(tmp_path: Path) -> None:
+    product = drafted(tmp_path, gear_pair()).product
+    fits = {(fit.shaft, fit.hole) for fit in product.fits}
+    assert {("shaft_1", "gear_1"), ("shaft_2", "gear_2"), ("shaft_1", "base")} <= fits
+    todo = [step.name for step in steps(product, plan(product))]
+    assert todo.index("insert gear_2") < todo.index("insert bridge") < todo.index("place bolts")
 
 
 def test_parts_that_cannot_be_assembled_are_said(tmp_path: Path) -> None:

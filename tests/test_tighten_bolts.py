@@ -18,11 +18,14 @@ from planning.motion.timing import JointMotion
 from planning.operations.counter_hold import Coming
 from planning.operations.station import Station
 from planning.operations.tighten_bolts.phases import (
-    CLUTCH_TIME,
-    Clutch,
+    DRIVEN,
+    FIRST,
+    ONLY,
+    SECOND,
     come_beside,
     star_order,
 )
+from planning.operations.tighten_bolts.servos import CLUTCH_TIME, Clutch
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
@@ -56,6 +59,18 @@ def test_six_bolts_are_tightened_crosswise() -> None:
 def test_order_follows_the_bolts_as_they_are_listed() -> None:
     station, places = bolts_on_a_circle(6)
     assert star_order(station, list(reversed(places)))[0] == "bolt_5"
+
+
+def test_what_is_recorded_of_two_passes_has_names_of_its_own() -> None:
+    """A record holds each kind of phase once per bolt; the last pass ends like an only one."""
+    kinds = [
+        {value for value in vars(each).values() if not isinstance(value, bool | float)}
+        for each in (FIRST, SECOND)
+    ]
+    assert len(kinds[0]) == len(kinds[1]) == 7
+    assert not kinds[0] & kinds[1]
+    assert ONLY.tighten is SECOND.tighten is DRIVEN[-1]
+    assert (FIRST.share, SECOND.share) == (0.5, 1.0)
 
 
 def trip_time(torques: list[float], dt: float) -> float | None:

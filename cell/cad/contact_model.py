@@ -17,6 +17,7 @@ import trimesh
 from manifold3d import CrossSection, Manifold
 
 from cell.cad.convex_pieces import CUT, Error, convex_pieces, error_of, to_manifold
+from cell.cad.edge_breaks import with_broken_edges
 from cell.cad.motor_unit import (
     BOLT_HOLE_EDGE,
     FIT_FRICTION,
@@ -68,7 +69,8 @@ class ContactModel:
 
     Attributes:
         pieces: In P [m].
-        error: Of all but the walls of holes, which are exact but for their facets.
+        error: Of all but the walls of holes, which are exact but for their facets, and but for the
+            breaks of edges.
         notes: What was simplified.
         friction_radius: By number of a clearance hole, the mean distance from its axis of the
             contact under the head [m].
@@ -123,7 +125,10 @@ def contact_model(
             pieces.append(Piece(f"boss_{number}", _metres(surface), _metal(), convex=True))
     bodies = convex_pieces(rest)
     contact = Contact(BED_FRICTION) if fixed else _metal(BODY_FRICTION)
+    shape = to_trimesh(solid)
     for number, body in enumerate(bodies):
+        if not fixed:
+            body = with_broken_edges(body, shape)
         name = f"{'bed' if fixed else 'body'}_{number}"
         pieces.append(Piece(name, _metres(to_trimesh(body)), contact, convex=True))
     # The walls of used holes are exact, and what their windows leave out touches nothing.

@@ -10,6 +10,7 @@ import manifold3d
 import numpy as np
 import trimesh
 
+from cell.products.inside import inside
 from cell.products.shells import taken_apart, volume
 from cell.products.surfaces import joined
 
@@ -139,18 +140,11 @@ def _with_cavities(shells: Sequence[trimesh.Trimesh]) -> tuple[list[trimesh.Trim
 
 
 def _surrounds(outer: trimesh.Trimesh, inner: trimesh.Trimesh) -> bool:
-    """Return whether a shell lies inside of another, by the winding number at one of its points."""
+    """Return whether a shell lies inside of another, by one of its points."""
     (low, high), (inner_low, inner_high) = outer.bounds, inner.bounds
     if np.any(inner_low < low) or np.any(inner_high > high):
         return False
-    a, b, c = np.moveaxis(np.asarray(outer.triangles) - inner.triangles_center[0], 1, 0)
-    x, y, z = (np.linalg.norm(side, axis=1) for side in (a, b, c))
-    dot = [np.einsum("ij,ij->i", p, q) for p, q in ((b, c), (c, a), (a, b))]
-    # Solid angle of a triangle [R] (Van Oosterom and Strackee, 1983).
-    half = np.arctan2(
-        np.einsum("ij,ij->i", a, np.cross(b, c)), x * y * z + dot[0] * x + dot[1] * y + dot[2] * z
-    )
-    return abs(float(half.sum())) > np.pi
+    return bool(inside(np.asarray(outer.triangles), inner.triangles_center[:1])[0])
 
 
 def _any_boxes_overlap(meshes: Sequence[trimesh.Trimesh]) -> bool:

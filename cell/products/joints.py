@@ -114,6 +114,8 @@ class Screw:
             that of a standard head and hole.
         drive: What turns it.
         bit_seat: Height of the bit's end above the underside of the head, when it is in [m].
+        passes: 1: tightened at once. 2: all screws that ask for it to half their torque first, for
+            where several clamp one part and disturb each other.
     """
 
     keys: ClassVar[tuple[str, ...]] = (
@@ -129,6 +131,7 @@ class Screw:
         "friction_radius_mm",
         "drive",
         "bit_seat_mm",
+        "passes",
     )
 
     part: str
@@ -143,6 +146,7 @@ class Screw:
     friction_radius: float | None = None
     drive: Drive = Drive("hex 2.5")
     bit_seat: float = BIT_SEAT
+    passes: int = 1
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -172,6 +176,7 @@ class Screw:
                 bit_seat=(
                     entry.positive("bit_seat_mm") * 1e-3 if "bit_seat_mm" in entry else BIT_SEAT
                 ),
+                passes=_passes(entry),
             )
             for bolt in product.members(entry.text("part"))
         ]
@@ -188,12 +193,15 @@ class Rest:
     Attributes:
         part: Name of the part that stands.
         on: Name of the part that it stands on.
+        depth: How far before its seat it enters what guides it, such as a lip its opening [m]; 0:
+            nothing does.
     """
 
-    keys: ClassVar[tuple[str, ...]] = ("part", "on")
+    keys: ClassVar[tuple[str, ...]] = ("part", "on", "depth_mm")
 
     part: str
     on: str
+    depth: float = 0.0
 
     @property
     def parts(self) -> tuple[str, ...]:
@@ -204,7 +212,8 @@ class Rest:
     def read(cls, entry: Fields, product: PartNames) -> Sequence[Rest]:
         """Return the joint that an entry describes; for a group, one for each of its members."""
         on = _part(entry, "on", product)
-        return [cls(part, on) for part in product.members(entry.text("part"))]
+        depth = entry.positive("depth_mm") * 1e-3 if "depth_mm" in entry else 0.0
+        return [cls(part, on, depth) for part in product.members(entry.text("part"))]
 
 
 Joint = Fit | Screw | Press | Rest
@@ -283,6 +292,13 @@ def head_friction(screw: Screw, counter: float | None = None) -> float:
 
 def _part(entry: Fields, key: str, product: PartNames) -> str:
     return one_of("part", entry.text(key), product.parts)
+
+
+def _passes(entry: Fields) -> int:
+    passes = entry.positive("passes") if "passes" in entry else 1
+    if passes not in (1, 2):
+        raise InputError(f"{entry.at('passes')}: expected 1 or 2, got {passes:g}.")
+    return int(passes)
 
 
 def _shaft_in_hole(entry: Fields, product: PartNames) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from cell.products.product import Product
 from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
 from planning.product_check.check import machine_findings, plan_findings, simulated_findings
-from planning.product_check.finding import Level
+from planning.product_check.finding import Finding, Level
 
 
 def run_check(
@@ -24,12 +24,7 @@ def run_check(
     """
     started = time.perf_counter()
     console = Console(quiet=quiet, highlight=False)
-    product.check_simulable()
-    found = list(machine_findings(product, config))
-    planned, todo = plan_findings(product, order, config)
-    found += planned
-    running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
-    found += simulated_findings(running.simulation, running.station, todo)
+    found = find(product, order, config, seed)
     levels = list(Level)
     for finding in sorted(found, key=lambda finding: levels.index(finding.level)):
         console.print(str(finding), markup=False, soft_wrap=True)
@@ -39,3 +34,19 @@ def run_check(
     verdict = f"{bad} would fail" if bad else "nothing would fail that can be seen without running"
     console.print(f"{product.name}: {verdict}, {doubts} doubtful; {seconds:.1f} s", markup=False)
     return 1 if bad else 0
+
+
+def find(
+    product: Product, order: tuple[str, ...] | None, config: CellConfig, seed: int
+) -> list[Finding]:
+    """Return what was found.
+
+    Raises:
+        InputError: The product cannot be simulated at all, or the order is malformed.
+    """
+    product.check_simulable()
+    found = list(machine_findings(product, config))
+    planned, todo = plan_findings(product, order, config)
+    found += planned
+    running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
+    return [*found, *simulated_findings(running.simulation, running.station, todo)]

@@ -36,14 +36,14 @@ class Wanted:
     """What a person gave; see `experiments.cli.init.Init`."""
 
     source: Path
-    units: str | None
-    materials: Sequence[str]
-    strength: str
-    torque: float | None
-    order: tuple[str, ...] | None
-    up: str | None
-    split: bool
-    leave_out: tuple[str, ...]
+    units: str | None = None
+    materials: Sequence[str] = ()
+    strength: str = "8.8"
+    torque: float | None = None
+    order: tuple[str, ...] | None = None
+    up: str | None = None
+    split: bool = False
+    leave_out: tuple[str, ...] = ()
 
 
 def run_init(wanted: Wanted, out: Path, config: CellConfig, *, quiet: bool) -> int:

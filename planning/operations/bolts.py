@@ -1,4 +1,4 @@
-"""How bolts stand on their threads, and how they lie loose in the holes of what they clamp."""
+"""How bolts stand on their threads, lie loose in the holes of what they clamp, and fit those."""
 
 from __future__ import annotations
 
@@ -10,6 +10,8 @@ from cell.products.product import Product
 from cell.workpieces.thread import Misfit
 from planning.operations.operation import Measured
 from planning.operations.snapshot import Snapshot
+
+LEAST_PLAY = 1e-6  # Of a bolt in its hole, where it is drawn without [m].
 
 
 def standing(screw: Screw, X_HF: RigidTransform) -> Measured:
@@ -38,3 +40,33 @@ def in_hole(product: Product, bolt: str, snapshot: Snapshot) -> Measured:
         "off_hole_m": float(np.hypot(passes[0], passes[1])),
         "lean_rad": float(np.arccos(np.clip(axis[2], -1.0, 1.0))),
     }
+
+
+def screw_play(product: Product, bolt: str) -> float:
+    """Return the radial play of a bolt in the hole of what it clamps, as drawn [m].
+
+    The hole is as wide as the nearest corner of the part's surface is away from the bolt's axis.
+    """
+    screw = product.screws[bolt]
+    part = product.parts[screw.clamps]
+    X_FP = product.parts[bolt].X_AP.InvertAndCompose(part.X_AP)
+    corners = X_FP.multiply(np.array(part.mesh.vertices, float).T)
+    wide = float(np.hypot(corners[0], corners[1]).min())
+    return max(wide - screw.diameter / 2.0, LEAST_PLAY)
+
+
+def play_share(product: Product, part: str, X_GoalP: RigidTransform) -> float:
+    """Return how far a part's screw holes are off their threads, over the play: the worst one.
+
+    Args:
+        product: Its screws; 0 is returned if none passes the part.
+        part: Name of the part that they clamp.
+        X_GoalP: Where it lies, in the frame where it belongs.
+    """
+    taken = 0.0
+    for bolt, screw in product.screws.items():
+        if screw.clamps == part:
+            X_PF = product.parts[part].X_AP.InvertAndCompose(product.parts[bolt].X_AP)
+            off = X_PF.rotation().inverse() @ (X_GoalP @ X_PF.translation() - X_PF.translation())
+            taken = max(taken, float(np.hypot(off[0], off[1])) / screw_play(product, bolt))
+    return taken

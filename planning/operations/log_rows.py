@@ -20,8 +20,11 @@ def rows_between(log: Arrays, start: float, end: float) -> dict[str, np.ndarray]
 
 
 def rows_of(log: Arrays, phases: Sequence[PhaseRecord]) -> dict[str, np.ndarray]:
-    """Return the log's rows from the start of the first to the end of the last of these phases."""
-    return rows_between(log, phases[0].start.time, phases[-1].end.time)
+    """Return the log's rows of these phases, in the order of time."""
+    time = log["time"]
+    spans = [(phase.start.time + 1e-9, phase.end.time + 1e-9) for phase in phases]
+    inside = np.any([(time > start) & (time <= end) for start, end in spans], axis=0)
+    return {name: a[inside] for name, a in log.items() if not name.startswith("phase_")}
 
 
 def logged_poses(cell: Cell, part: str, q: np.ndarray) -> list[RigidTransform]:

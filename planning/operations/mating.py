@@ -63,7 +63,8 @@ class Mating:
         on: Name of the part on the fixture.
         p_AoC: Compliance centre C, in the product frame A [m]: the mouth of the hole in the hand,
             the tip of the shaft in the hand, or the middle of the face that comes to rest.
-        depth: How far before its seat a shaft meets its hole [m]; 0: nothing guides the part.
+        depth: How far before its seat it meets what guides it, as a shaft its hole [m]; 0: nothing
+            does.
         axis: (3,) direction out of the seat, in A.
     """
 

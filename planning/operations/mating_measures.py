@@ -7,7 +7,7 @@ from pydrake.math import RigidTransform
 
 from cell.builder import Cell
 from cell.products.product import Product
-from planning.operations.bolts import standing
+from planning.operations.bolts import play_share, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.log_rows import logged_poses, rows_of
 from planning.operations.mating import SOFT, MatePhase, Mating
@@ -27,12 +27,19 @@ def measure_mating(cell: Cell, record: StepRecord, mating: Mating) -> Measured:
         measured["searched"] = float(bool(record.of(mating.part, MatePhase.SEARCH)))
     if soft and record.of(mating.part, HandPhase.RELEASE):
         assert record.end is not None
-        gap, tilt, aside = seat_errors(cell.product, mating, record.end)
+        gap, tilt, _ = seat_errors(cell.product, mating, record.end)
         measured |= {"gap_m": gap, "tilt_rad": tilt}
-        if mating.depth == 0.0:
-            measured["off_place_m"] = aside
         measured |= riders_standing(cell.product, record.step.riders, record.end)
     return measured | base_moved(record)
+
+
+def off_place(product: Product, mating: Mating, snapshot: Snapshot) -> Measured:
+    """Return how far a seated part is aside, and how much of its screws' play that takes up."""
+    X_GoalP = _X_GoalP(product, mating, snapshot)
+    return {
+        "off_place_m": seat_errors(product, mating, snapshot)[2],
+        "screw_play_share": play_share(product, mating.part, X_GoalP),
+    }
 
 
 def riders_standing(product: Product, riders: tuple[str, ...], snapshot: Snapshot) -> Measured:
@@ -53,7 +60,7 @@ def seat_errors(product: Product, mating: Mating, snapshot: Snapshot) -> tuple[f
     Returns:
         Gap along the axis [m], tilt [rad], and distance across the axis [m].
     """
-    X_GoalP = _X_GoalP(product, mating, snapshot.X_WP[mating.on], snapshot.X_WP[mating.part])
+    X_GoalP = _X_GoalP(product, mating, snapshot)
     p_PC, axis = _centre(product, mating)
     off = X_GoalP @ p_PC - p_PC
     gap, cosine = float(axis @ off), float(axis @ (X_GoalP.rotation() @ axis))
@@ -69,7 +76,7 @@ def insertion_curve(
     poses = [logged_poses(cell, name, rows["q"]) for name in (mating.on, mating.part)]
     p_PC, axis = _centre(cell.product, mating)
     gaps = [
-        axis @ (_X_GoalP(cell.product, mating, *pair) @ p_PC - p_PC)
+        axis @ (_between(cell.product, mating, *pair) @ p_PC - p_PC)
         for pair in zip(*poses, strict=True)
     ]
     return mating.depth - np.array(gaps), rows[f"{cell.holder.name}_wrench"][:, 3:]
@@ -81,9 +88,14 @@ def _centre(product: Product, mating: Mating) -> tuple[np.ndarray, np.ndarray]:
     return X_PA @ mating.p_AoC, X_PA.rotation() @ mating.axis
 
 
-def _X_GoalP(
+def _X_GoalP(product: Product, mating: Mating, snapshot: Snapshot) -> RigidTransform:
+    """Return the pose of a part in the frame where it is seated."""
+    return _between(product, mating, snapshot.X_WP[mating.on], snapshot.X_WP[mating.part])
+
+
+def _between(
     product: Product, mating: Mating, X_WOn: RigidTransform, X_WP: RigidTransform
 ) -> RigidTransform:
-    """Return the pose of a part in the frame where it is seated."""
+    """Return X_GoalP for poses of the parts."""
     on, part = product.parts[mating.on], product.parts[mating.part]
     return (X_WOn @ on.X_AP.InvertAndCompose(part.X_AP)).InvertAndCompose(X_WP)

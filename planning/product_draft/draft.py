@@ -85,14 +85,14 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
     screws, guesses = guess_screws(features)
     fits, more = guess_fits(features, screws)
     guesses += more
-    densities = _densities(list(meshes), {s.part for s in screws}, options.materials, guesses)
-    masses = {name: densities[name] * float(mesh.volume) for name, mesh in meshes.items()}
+    materials = _materials(list(meshes), {s.part for s in screws}, options.materials, guesses)
+    masses = {n: DENSITIES[materials[n]] * float(mesh.volume) for n, mesh in meshes.items()}
     parts = {n: replace(part, mass=masses[n]) for n, part in product.parts.items()}
     grouped = replace(product, parts=parts, groups={**product.groups, **_screw_groups(screws)})
     fixing = _planned(grouped, {s.part for s in screws}, options, guesses)
     place = {n: k for k, item in enumerate(fixing.order) for n in grouped.members(item)}
     base = fixing.steps[0].fixed_part
-    seen = Recognised(meshes, features, screws, fits, densities, place, base)
+    seen = Recognised(meshes, features, screws, fits, materials, place, base)
     contacts, more = contact_models(seen)
     guesses += more
     modelled = write_parts(grouped, seen, contacts, folder)
@@ -128,10 +128,10 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
     return Draft(drafted, base, contacts, (*guesses, *joining.guesses))
 
 
-def _densities(
+def _materials(
     names: list[str], screws: set[str], given: Mapping[str, str], guesses: list[Guess]
-) -> dict[str, float]:
-    """Return densities by name of the part [kg/m3], and add what is said of the materials."""
+) -> dict[str, str]:
+    """Return materials by name of the part, and add what is said of them."""
     for name in given:
         if name and name not in names:
             raise InputError(f"--material {name}=...: no such part; {', '.join(names)}.")
@@ -150,7 +150,7 @@ def _densities(
         material = material_named(material)
         if sure < 1.0:
             guesses.append(Guess(name, material, reason, sure))
-        found[name] = DENSITIES[material]
+        found[name] = material
     return found
 
 

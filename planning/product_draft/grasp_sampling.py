@@ -15,7 +15,7 @@ import trimesh
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.products.product import Grasp
-from planning.product_draft.depth_maps import DepthMaps
+from planning.product_draft.depth_maps import CELL, DepthMaps
 from planning.product_draft.hand_shape import JAWS, HandShape, surface
 
 PAD_FRICTION = 0.5  # [D] 2 a b / (a + b) of the pads' 0.8 and of 0.36, machined metal.
@@ -24,9 +24,12 @@ GOOD_AREA = 1.5e-4  # [A] More is no better [m2].
 STEP = 2.5e-3  # Between jaw places on a part [m].
 SIDES_WANTED = 8  # [A] Closing directions, those with the most area.
 MARGIN, TIGHT = 1e-3, 2e-4  # [A] Kept from what stands around, open and closed [m].
+# [D] Of the end of a jaw over what the part stands on [m]: closed on a part that is smaller than
+# that, and open beside one that is as large.
+ABOVE_GROUND = (TIGHT + 1e-4, MARGIN + 1e-4)
 BACK = (0.0, 0.015, 0.05)  # Along the approach, where the opened hand is checked [m].
 CLEARANCE = 4e-3  # The jaws open this much wider than the part [m]; see operations.grasping.
-TILTS = np.deg2rad([0.0, 12.0, 24.0])  # [A] Of a side grasp, palm up.
+TILTS = np.deg2rad([0.0, 12.0, 21.0, 24.0])  # [A] Of a side grasp, palm up.
 KEPT = 6  # [A] Grasps of one kind that are kept.
 FAR_APART = 4e-3  # [A] Grasps that are nearer count as one [m].
 LARGEST_FORCE, LEAST_FORCE = 65.0, 5.0  # [R] Of 130 N for both pads; [A] a screw's.
@@ -72,6 +75,8 @@ def sample_grasps(
         from_side: Whether the hand comes from the side, and not from above.
     """
     own = surface(mesh)
+    # Held where it is assembled, jaws may close on what is flush with it, too: that holds as well.
+    tight = -TIGHT if from_side else TIGHT
     found: list[RankedGrasp] = []
     for R in _orientations(mesh, up, from_side):
         maps = DepthMaps.of(mesh, R)
@@ -80,7 +85,7 @@ def sample_grasps(
         for ranked in candidates:
             if kept == 2:
                 break
-            if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around):
+            if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around, tight):
                 continue
             found.append(ranked)
             kept += 1
@@ -126,7 +131,9 @@ def _candidates(
         face, (least, most) = hand.faces[jaw], hand.widths(jaw)
         half_y, half_z = face.size[0] / 2.0, face.size[1] / 2.0
         ys = _places(maps.y, p_Com[1], half_y)
-        zs = _places(maps.z, p_Com[2], half_z - setback)
+        # Besides, with the end of the jaw just beyond what the part stands on.
+        ends = maps.z[-1] + CELL / 2.0 - half_z - np.array(ABOVE_GROUND)
+        zs = [*_places(maps.z, p_Com[2], half_z - setback), *ends]
         for y in ys:
             for z in zs:
                 grip = maps.grip((y - half_y, y + half_y), (z - half_z, z + half_z))
@@ -176,9 +183,16 @@ def _is_near(ranked: RankedGrasp, found: Sequence[RankedGrasp]) -> bool:
 
 
 def _is_clear(
-    grasp: Grasp, hand: HandShape, own: fcl.BVHModel, around: Sequence[fcl.BVHModel]
+    grasp: Grasp,
+    hand: HandShape,
+    own: fcl.BVHModel,
+    around: Sequence[fcl.BVHModel],
+    tight: float,
 ) -> bool:
-    """Return whether the opened hand comes without touching anything, and closes likewise."""
+    """Return whether the opened hand comes without touching anything, and closes likewise.
+
+    Closed it keeps the distance ``tight`` from what is around, or reaches as deep into it [m].
+    """
     closed = grasp.width - hand.gripper.setback[grasp.jaw]
     opening = min(closed + CLEARANCE, hand.gripper.stroke)
     X_PTip = grasp.X_PJaw @ RigidTransform(-hand.p_TipJaw[grasp.jaw])
@@ -188,7 +202,7 @@ def _is_clear(
             hand.shape(opening, 0.0), X, [own]
         ):
             return False
-    return not _hits(hand.shape(closed, TIGHT), X_PTip, around)
+    return not _hits(hand.shape(closed, tight), X_PTip, around)
 
 
 def _hits(hand: fcl.BVHModel, X: RigidTransform, around: Sequence[fcl.BVHModel]) -> bool:

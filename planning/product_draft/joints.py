@@ -5,19 +5,28 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
+from manifold3d import Manifold
+
 from cell.cad.contact_model import ContactModel
+from cell.cad.convex_pieces import to_manifold
+from cell.cad.round_features import Cylinder
 from cell.errors import RunFailure
 from cell.products.drives import Drive
 from cell.products.joints import Fit, Joint, Press, Rest, Screw
+from cell.products.press_force import Ring, press_force
 from cell.products.screw_table import NUT_FACTOR
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.directions import unit_vector
+from planning.product_draft.engagement import engagement
 from planning.product_draft.guess import Guess
 from planning.product_draft.joint_guesses import LINE_TO_LINE, FitGuess, ScrewGuess
 from planning.product_draft.recognised import Recognised
 
 DRIVER_TORQUE = 0.5  # [A] Of the driver: see `cell.machines.driver`, which stalls at 0.7 [N m].
-PRESS_FORCE = 100.0  # [A] Where CAD says nothing [N].
+# [A] Screws on one part from which they are tightened in two passes: three set its plane, and those
+# that follow raise or relax the first; two pull it down evenly enough [M].
+TWO_PASSES = 3
 
 
 @dataclass
@@ -72,6 +81,7 @@ class Joining:
             what = f"tightened to {torque:.2g} N m with a {screw.head.drive} bit"
             self.guesses.append(Guess(screw.part, what, reason, 0.6))
         radius = self.contacts[screw.clamps].friction_radius[screw.clamped_hole]
+        beside = [other for other in self.seen.screws if other.clamps == screw.clamps]
         return Screw(
             part=screw.part,
             into=screw.into,
@@ -85,6 +95,7 @@ class Joining:
             friction_radius=radius,
             drive=Drive(screw.head.drive),
             bit_seat=screw.head_size[1] - 1e-3 * screw.head.engagement,
+            passes=2 if len(beside) >= TWO_PASSES else 1,
         )
 
     def _fit(self, fit: FitGuess, later: str) -> Joint:
@@ -102,8 +113,30 @@ class Joining:
             depth = mouth - shaft.flare_low[1]
         p_AoF = hole.point + mouth * hole.axis
         if fit.clearance < -LINE_TO_LINE:
-            return Press(fit.shaft, fit.hole, p_AoF, depth, PRESS_FORCE)
+            return Press(fit.shaft, fit.hole, p_AoF, depth, self._press_force(fit, shaft, depth))
         return Fit(fit.shaft, fit.hole, p_AoF, depth)
+
+    def _press_force(self, fit: FitGuess, shaft: Cylinder, depth: float) -> float:
+        """Return the force that a press fit takes, with its parts taken for cylinders [N]."""
+        materials, mesh = self.seen.materials, self.seen.meshes[fit.hole]
+        bores = [
+            other.radius
+            for other in self.seen.features[fit.shaft]
+            if other.hole and other.radius < shaft.radius and other.coaxial(shaft, 1e-4)
+        ]
+        # What is around the hole, as far as it goes to the side that is nearest.
+        across = np.abs(np.asarray(mesh.bounds) - shaft.point)
+        outer = float(across[:, np.abs(shaft.axis) < 0.5].min())
+        force = press_force(
+            Ring(materials[fit.shaft], max(bores, default=0.0), shaft.radius),
+            Ring(materials[fit.hole], shaft.radius, outer),
+            -fit.clearance,
+            depth,
+        )
+        what = f"pressed into {fit.hole} with {float(f'{force:.2g}'):g} N"
+        reason = f"{materials[fit.shaft]} in {materials[fit.hole]}, by Lame"
+        self.guesses.append(Guess(fit.shaft, what, reason, 0.5))
+        return force
 
     def _rest(self, name: str, earlier: set[str]) -> Rest:
         names = self.plan.parts
@@ -114,7 +147,8 @@ class Joining:
         # The lowest contact bears it.
         up = unit_vector(self.up)
         bearer = max(on, key=lambda n: float((self.seen.meshes[n].vertices @ up).max()))
-        self.guesses.append(
-            Guess(name, f"rests on {bearer}", "it touches it, and no shaft joins them", 0.8)
-        )
-        return Rest(name, bearer)
+        solids = {n: to_manifold(self.seen.meshes[n]).scale([1e3] * 3) for n in (name, *earlier)}
+        depth = engagement(solids.pop(name), sum(solids.values(), Manifold()), up)
+        what = f"rests on {bearer}" + (f", guided over {depth:.2g} mm" if depth else "")
+        self.guesses.append(Guess(name, what, "it touches it, and no shaft joins them", 0.8))
+        return Rest(name, bearer, 1e-3 * depth)

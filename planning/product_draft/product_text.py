@@ -107,6 +107,7 @@ def _joint(joint: Joint, product: Product) -> Iterator[str]:
         yield f"    bit_seat_mm: {1e3 * joint.bit_seat:.4g}  # Its end above the head's underside."
         assert joint.friction_radius is not None
         yield f"    friction_radius_mm: {1e3 * joint.friction_radius:.6g}  # Of the contact model."
+        yield f"    passes: {joint.passes}  # 2: all to half the torque first, then to the whole."
     elif isinstance(joint, Fit | Press):
         yield f"  - type: {'press' if isinstance(joint, Press) else 'fit'}"
         yield f"    shaft: {_quoted(joint.shaft)}"
@@ -114,11 +115,13 @@ def _joint(joint: Joint, product: Product) -> Iterator[str]:
         yield f"    at_mm: {_vector(1e3 * joint.p_AoF, 4)}  # Middle of the mouth of the hole."
         yield f"    depth_mm: {1e3 * joint.depth:.5g}"
         if isinstance(joint, Press):
-            yield f"    force_N: {joint.force:g}  # It seats it."
+            yield f"    force_N: {joint.force:.4g}  # It seats it."
     elif isinstance(joint, Rest):
         yield "  - type: rest"
         yield f"    part: {_quoted(joint.part)}"
         yield f"    on: {_quoted(joint.on)}"
+        if joint.depth:
+            yield f"    depth_mm: {1e3 * joint.depth:.4g}  # So deep it goes into what guides it."
 
 
 def _pose(X: RigidTransform) -> str:

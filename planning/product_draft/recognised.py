@@ -1,4 +1,4 @@
-"""What is recognised in CAD: surfaces, round features, screws, fits, densities."""
+"""What is recognised in CAD: surfaces, round features, screws, fits, materials."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 import trimesh
 
+from cell.products.materials import DENSITIES
 from cell.products.product import Part
 from planning.product_draft.joint_guesses import Features, FitGuess, ScrewGuess
 
@@ -21,7 +22,7 @@ class Recognised:
         features: Their round holes and bosses.
         screws: Those among them.
         fits: Between the others.
-        densities: By name [kg/m3].
+        materials: Their names, by name of the part.
         place: By name, when it comes in the order.
         base: Name of the part that the fixture holds.
     """
@@ -30,9 +31,14 @@ class Recognised:
     features: Features
     screws: Sequence[ScrewGuess]
     fits: Sequence[FitGuess]
-    densities: Mapping[str, float]
+    materials: Mapping[str, str]
     place: Mapping[str, int]
     base: str
+
+    @property
+    def densities(self) -> dict[str, float]:
+        """By name [kg/m3]."""
+        return {name: DENSITIES[material] for name, material in self.materials.items()}
 
     @property
     def screw_named(self) -> dict[str, ScrewGuess]:

@@ -1,4 +1,4 @@
-"""The phases that put a part onto or into another one, where nothing but its seat holds it."""
+"""The phases that put a part onto or into another one, where no shaft holds it."""
 
 from __future__ import annotations
 
@@ -34,4 +34,4 @@ def mating_of(product: Product, step: Step) -> Mating:
     corners = part.X_AP.multiply(np.array(part.mesh.vertices, float).T).T
     p_AoG = part.X_AP @ np.asarray(part.mesh.center_mass, float)
     p_AoC = p_AoG + up * float((corners @ up).min() - up @ p_AoG)
-    return Mating(joint.part, joint.on, p_AoC, 0.0, up)
+    return Mating(joint.part, joint.on, p_AoC, joint.depth, up)

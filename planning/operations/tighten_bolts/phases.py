@@ -2,7 +2,7 @@
 
 The driver comes down on one head after another: bit into socket, thread caught, run down, seated,
 tightened until the clutch trips. The gripper holds the clamped part meanwhile, or is out of the
-way.
+way. Screws that ask for two passes are all tightened to half their torque first.
 """
 
 from __future__ import annotations
@@ -21,29 +21,25 @@ from cell.simulation.phase import (
     Follow,
     Outcome,
     Phase,
-    Sensed,
     Spin,
     after,
     motion_finished,
 )
 from cell.simulation.vocabulary import in_programs
 from planning.motion.paths import NoPath
-from planning.motion.timing import JointMotion
 from planning.operations.counter_hold import Coming, from_the_side, hold, park
 from planning.operations.grasping import Reach, backed_off, let_go, opened, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
 FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
 SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
 FEED_RESERVE = 0.003  # The feed can follow the bolt this far beyond its engaged length [m] [A].
-FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
-FEED_LIMIT = 0.02  # [m/s] [A]
 STOP_TIME = 0.05  # Of the spindle [s] [A].
-CLUTCH_TIME = 0.002  # The clutch does not feel shorter shocks [s] [A].
 REST_TIME = 0.2  # [s] [A]
 RETREAT = 0.05  # Of the gripper from what it held [m] [A].
 
@@ -61,10 +57,60 @@ class DrivePhase(Enum):
     STOP = "stop"
     DRIVER_OFF = "driver off"
     REST = "rest"
+    # Of screws that come twice, the first time.
+    FIRST_TIGHTEN = "tighten to half"
+    FIRST_STOP = "stop at half"
+    FIRST_DRIVER_OFF = "driver off at half"
+    # And the second time.
+    SECOND_LOOK = "look again"
+    SECOND_DRIVER_ABOVE = "driver above again"
+    SECOND_LOOK_AT_HEAD = "look at the head again"
+    SECOND_BIT_IN = "bit into socket again"
 
+
+@dataclass(frozen=True)
+class Pass:
+    """One coming of the driver to each screw.
+
+    Attributes:
+        share: Of its torque.
+        standing: Whether the bolt stands on the mouth of its thread, and is not seated yet.
+        look, above, look_at_head, bit_in, tighten, stop, off: Kinds of its phases.
+    """
+
+    share: float
+    standing: bool
+    look: DrivePhase = DrivePhase.LOOK
+    above: DrivePhase = DrivePhase.DRIVER_ABOVE
+    look_at_head: DrivePhase = DrivePhase.LOOK_AT_HEAD
+    bit_in: DrivePhase = DrivePhase.BIT_IN
+    tighten: DrivePhase = DrivePhase.TIGHTEN
+    stop: DrivePhase = DrivePhase.STOP
+    off: DrivePhase = DrivePhase.DRIVER_OFF
+
+
+ONLY = Pass(1.0, standing=True)
+# In two steps, half the torque and then the whole: so each screw finds what it clamps level, and
+# takes less from those before it [R] (multiple-pass tightening against elastic interaction:
+# boltscience.com, Tightening Sequences; two steps: Tohnichi, Torque Handbook, chapter 2). [A] Half.
+FIRST = Pass(
+    0.5,
+    standing=True,
+    tighten=DrivePhase.FIRST_TIGHTEN,
+    stop=DrivePhase.FIRST_STOP,
+    off=DrivePhase.FIRST_DRIVER_OFF,
+)
+SECOND = Pass(
+    1.0,
+    standing=False,
+    look=DrivePhase.SECOND_LOOK,
+    above=DrivePhase.SECOND_DRIVER_ABOVE,
+    look_at_head=DrivePhase.SECOND_LOOK_AT_HEAD,
+    bit_in=DrivePhase.SECOND_BIT_IN,
+)
 
 # Those in which the bolt turns in its thread, in their order.
-DRIVEN = (DrivePhase.RUN_DOWN, DrivePhase.TIGHTEN)
+DRIVEN = (DrivePhase.RUN_DOWN, DrivePhase.FIRST_TIGHTEN, DrivePhase.TIGHTEN)
 
 
 def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
@@ -85,66 +131,6 @@ def star_order(station: Station, bolts: Sequence[str]) -> list[str]:
     return order
 
 
-@in_programs
-@dataclass
-class Feed:
-    """Servo of the driver's arm: sink so that the bit holder's spring pushes with a set force.
-
-    Attributes:
-        tool: Name of the driver.
-        line: Motion straight down, as a path to be followed at the servo's own pace.
-        length: Of that path [m].
-        thrust: Wanted axial force on the bit [N].
-        dt: Time step [s].
-        progress: Time on the line reached so far [s].
-    """
-
-    tool: str
-    line: JointMotion
-    length: float
-    thrust: float
-    dt: float
-    progress: float = 0.0
-
-    def __call__(self, sensed: Sensed) -> tuple[np.ndarray, np.ndarray]:
-        """Return the joint target for the next step."""
-        missing = self.thrust - sensed.drivers[self.tool].push
-        speed = float(np.clip(FEED_GAIN * missing, -FEED_LIMIT, FEED_LIMIT))
-        rate = speed * self.line.duration / self.length
-        self.progress = float(np.clip(self.progress + rate * self.dt, 0.0, self.line.duration))
-        q, v = self.line.at(self.progress)
-        return q, v * rate
-
-
-@in_programs
-@dataclass
-class Clutch:
-    """End condition: the spindle has kept up a torque; a shock does not trip it.
-
-    Attributes:
-        tool: Name of the driver.
-        torque: To trip at [N m].
-    """
-
-    tool: str
-    torque: float
-    _reached: float | None = None
-
-    def __call__(self, sensed: Sensed) -> bool:
-        """Return whether the clutch trips."""
-        if sensed.drivers[self.tool].torque < self.torque:
-            self._reached = None
-        elif self._reached is None:
-            self._reached = sensed.time
-        # Times are multiples of the step, so half a microsecond only absorbs rounding.
-        return self._reached is not None and sensed.time >= self._reached + CLUTCH_TIME - 5e-7
-
-    def missing(self, sensed: Sensed) -> str:
-        """Return what it is waiting for."""
-        torque = sensed.drivers[self.tool].torque
-        return f"the spindle turns with {torque:.2f} N m, not with {self.torque:g} N m"
-
-
 def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     """Yield the phases that tighten every bolt of a step."""
     clamped = station.cell.product.screws[step.parts[0]].clamps
@@ -160,14 +146,12 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
 
     if station.config.driver.counter_hold:
         grasp = yield from hold(station, clamped, meanwhile, leaves_room)
-        for bolt in order:
-            yield from tighten_bolt(station, bolt)
+        yield from _tighten_all(station, order)
         if grasp is not None:
             yield from let_go(station, clamped, grasp, RETREAT, assembly)
     else:
         yield from park(station, meanwhile)
-        for bolt in order:
-            yield from tighten_bolt(station, bolt)
+        yield from _tighten_all(station, order)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
     yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
 
@@ -195,8 +179,18 @@ def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
     return all(ways_above(station, bolt, hand) for bolt in bolts)
 
 
-def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]:
-    """Yield the phases that drive one bolt home."""
+def _tighten_all(station: Station, order: Sequence[str]) -> Generator[Phase, Outcome, None]:
+    """Yield the phases that drive bolts home, those that ask for two passes in two."""
+    screws = station.cell.product.screws
+    twice = [bolt for bolt in order if screws[bolt].passes > 1]
+    for bolt in twice:
+        yield from tighten_bolt(station, bolt, FIRST)
+    for bolt in order:
+        yield from tighten_bolt(station, bolt, SECOND if bolt in twice else ONLY)
+
+
+def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, Outcome, None]:
+    """Yield the phases of one pass on one bolt."""
     driver, spindle = station.driver, station.driver.tool.name
     config = station.config
     tip, screw = driver.frame("tool_tip"), station.cell.product.screws[bolt]
@@ -208,11 +202,11 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     driven = [station.cell.product.screws[name] for name in station.driven]
     clamped = any(seat == {other.into, other.clamps} for other in driven)
 
-    yield from look(station, DrivePhase.LOOK, bolt, awake=_awake(station))
+    yield from look(station, kinds.look, bolt, awake=_awake(station))
     holding = _holding(station)
     above = _above(station, bolt)
     yield Phase(
-        DrivePhase.DRIVER_ABOVE,
+        kinds.above,
         motion_finished,
         timeout=20.0,
         subject=bolt,
@@ -222,11 +216,11 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         },
         awake=_awake(station),
     )
-    yield from look(station, DrivePhase.LOOK_AT_HEAD, bolt, [bolt], awake=_awake(station))
+    yield from look(station, kinds.look_at_head, bolt, [bolt], awake=_awake(station))
     R_WE = station.tool_pose(driver, "tool_tip").rotation()
     X_WE = RigidTransform(R_WE, _socket_pose(station, bolt).translation())
     outcome = yield Phase(
-        DrivePhase.BIT_IN,
+        kinds.bit_in,
         # That the hex has dropped into the socket is told by the model of the joint between them,
         # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
         All((motion_finished, Signal(f"{bolt} in bit"))),
@@ -239,28 +233,29 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         awake=awake,
     )
 
-    # The bolt stood on the mouth of its thread when the bit dropped in: how far it has to sink is
-    # known from then on, wherever it was seen to stand.
+    # The bolt stood on the mouth of its thread, or was seated, when the bit dropped in: how far it
+    # has to sink is known from then on, wherever it was seen to stand.
     bit = driver.frame("bit_tip")
     mouth = outcome.sensed.X_WF(bit).translation()[2]
-    depth = screw.thread_depth + FEED_RESERVE
+    depth = (screw.thread_depth if kinds.standing else 0.0) + FEED_RESERVE
     down = raised(station.tool_pose(driver, "tool_tip"), -depth)
     line = station.line(driver, tip, down, speed=FEED_LIMIT)
     feed = Follow(Feed(spindle, line, depth, config.driver.push_force, config.simulation.time_step))
-    nearly_seated = Below(Height(bit), float(mouth) - (screw.thread_depth - SLOW_BELOW))
+    if kinds.standing:
+        nearly_seated = Below(Height(bit), float(mouth) - (screw.thread_depth - SLOW_BELOW))
+        yield Phase(
+            DrivePhase.RUN_DOWN,
+            nearly_seated,
+            timeout=10.0,
+            subject=bolt,
+            commands={driver.name: feed, spindle: Spin(config.driver.free_speed)},
+            awake=awake,
+            mating=frozenset() if clamped else mating,
+        )
+        station.driven += (bolt,)
     yield Phase(
-        DrivePhase.RUN_DOWN,
-        nearly_seated,
-        timeout=10.0,
-        subject=bolt,
-        commands={driver.name: feed, spindle: Spin(config.driver.free_speed)},
-        awake=awake,
-        mating=frozenset() if clamped else mating,
-    )
-    station.driven += (bolt,)
-    yield Phase(
-        DrivePhase.TIGHTEN,
-        Clutch(spindle, screw.torque),
+        kinds.tighten,
+        Clutch(spindle, kinds.share * screw.torque),
         timeout=5.0,
         subject=bolt,
         commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
@@ -269,7 +264,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
         fine_log=True,
     )
     yield Phase(
-        DrivePhase.STOP,
+        kinds.stop,
         after(STOP_TIME),
         timeout=1.0,
         subject=bolt,
@@ -279,7 +274,7 @@ def tighten_bolt(station: Station, bolt: str) -> Generator[Phase, Outcome, None]
     )
     off = backed_off(station.tool_pose(driver, "tool_tip"), BIT_HOVER + depth)
     yield Phase(
-        DrivePhase.DRIVER_OFF,
+        kinds.off,
         motion_finished,
         timeout=5.0,
         subject=bolt,

@@ -9,7 +9,7 @@ from planning.operations.log_rows import rows_of
 from planning.operations.operation import Arrays, StepRecord
 from planning.operations.plot import Plot
 from planning.operations.tighten_bolts.measures import thread_curve
-from planning.operations.tighten_bolts.phases import DRIVEN
+from planning.operations.tighten_bolts.phases import DRIVEN, DrivePhase
 
 # What a reader asks about the curves.
 SPIKES = (
@@ -27,7 +27,7 @@ def plots(cell: Cell, record: StepRecord, log: Arrays) -> list[Plot]:
     end: dict[str, tuple[np.ndarray, np.ndarray]] = {}
     for bolt in record.step.parts:
         phases = record.of(bolt, *DRIVEN)
-        if len(phases) == len(DRIVEN):
+        if record.of(bolt, DrivePhase.TIGHTEN):
             rows = rows_of(log, phases)
             angle, _, clamp = thread_curve(cell, bolt, rows)
             torque = rows[f"{cell.driver.tool.name}_torque"][-len(clamp) :]
