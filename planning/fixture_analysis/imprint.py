@@ -154,13 +154,34 @@ def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
     return SurfaceSamples(samples.name, under.points, normals, areas)
 
 
-def press(
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A body that has been pressed into a bed.
+
+    Attributes:
+        bed: Soft, with the body in it; the next body is pressed into the same one, inflated anew.
+        cap: (n, n) its surface before [m].
+        p_JA: (3,) place of the product frame; its rotation is the posture [m].
+        points: (m, 3) points of the body that face down, in J [m].
+        depth: Of the lowest point below the apex [m].
+        force: That the bed bears [N].
+    """
+
+    bed: Bed
+    cap: np.ndarray
+    p_JA: np.ndarray
+    points: np.ndarray
+    depth: float
+    force: float
+
+
+def pressed(
     parts: Iterable[PartSurface],
     R_JA: np.ndarray,
     p_middle: np.ndarray,
     jig: JigParameters,
     force: float,
-) -> Imprint:
+) -> Pressed:
     """Press a body into the bed.
 
     Args:
@@ -186,7 +207,19 @@ def press(
     cap = bed.heights.copy()
     descent = _Descent(bed, body, p_middle, apex - lowest)
     depth, borne = descent.down_to(force, apex - jig.bag.floor)
-    return _imprint(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
+    p_JA = np.array([*(-p_middle), apex - depth - lowest])
+    return Pressed(bed, cap, p_JA, points + p_JA, depth, borne)
+
+
+def press(
+    parts: Iterable[PartSurface],
+    R_JA: np.ndarray,
+    p_middle: np.ndarray,
+    jig: JigParameters,
+    force: float,
+) -> Imprint:
+    """Return the imprint of a body that is pressed into the bed; arguments as of `pressed`."""
+    return _imprint(pressed(parts, R_JA, p_middle, jig, force))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,24 +271,16 @@ def _bed_of(jig: JigParameters) -> Bed:
     return Bed(jig.bag, jig.soil)
 
 
-def _imprint(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
-    """Return the imprint: the bed's surface and the body's underside above it.
-
-    Args:
-        bed: After the push.
-        cap: (n, n) its surface before [m].
-        points: (m, 3) points of the body that face down, in J.
-        depth: Of the lowest point below the apex [m].
-        borne: What the bed bears [N].
-    """
-    low, cell = bed.bag.cap_height - depth, bed.bag.cell
+def _imprint(body: Pressed) -> Imprint:
+    """Return the imprint: the bed's surface and the body's underside above it."""
+    bed, points = body.bed, body.points
+    low, cell = bed.bag.cap_height - body.depth, bed.bag.cell
     at = np.rint((points[:, :2] - bed.axis[0]) / cell).astype(int)
     inside = np.all((at >= 0) & (at < len(bed.axis)), axis=1)
     under = np.full(bed.heights.shape, np.inf)
     np.minimum.at(under, tuple(at[inside].T), points[inside, 2])
     bearing = bed.active & (under < bed.heights + BEARING)
-    volume = float(np.maximum(cap - bed.heights, 0.0).sum()) * cell**2
+    volume = float(np.maximum(body.cap - bed.heights, 0.0).sum()) * cell**2
     outline = footprint(np.column_stack([bed.x[bearing], bed.y[bearing]]))
-    return Imprint(
-        depth, borne, volume, bed.ledger.waiting, cell, bed.heights - low, under - low, outline
-    )
+    excess, relative = bed.ledger.waiting, (bed.heights - low, under - low)
+    return Imprint(body.depth, body.force, volume, excess, cell, *relative, outline)
