@@ -105,7 +105,7 @@ def mapped_body(config: CellConfig, product: Product, posture: Posture) -> Froze
     held = HeldPart.of(part, solid, config.jig.jammed.friction)
     R_JP = upright(posture.up, 0.0).matrix()
     p_middle = (R_JP @ part.mesh.center_mass)[:2]
-    return frozen_body([held], R_JP, p_middle, config.jig, config.placement.press_force)
+    return frozen_body([held], [solid], R_JP, p_middle, config.jig, config.placement.press_force)
 
 
 def study(

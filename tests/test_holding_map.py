@@ -260,7 +260,7 @@ def can_in_bed(press_force: float, vacuum: float | None = None):
     (solid,) = solids_of(product).values()
     part = HeldPart.of(product.parts["can"], solid, JIG.jammed.friction)
     return frozen_body(
-        [part], rotation_with_up("+z").matrix(), np.zeros(2), JIG, press_force, vacuum
+        [part], [solid], rotation_with_up("+z").matrix(), np.zeros(2), JIG, press_force, vacuum
     )
 
 

@@ -33,14 +33,12 @@ class HeldPart:
     """A part as the frozen bed feels it.
 
     Attributes:
-        solid: In A.
         surface: Points on it, in A.
         hulls: Vertices (n, 3) in A of the convex pieces that touch the bed [m].
         friction: Of the membrane on it.
         pins: Whether its surface outside of the pieces touches the beads as well.
     """
 
-    solid: Solid
     surface: PartSurface
     hulls: Sequence[np.ndarray]
     friction: float
@@ -51,7 +49,7 @@ class HeldPart:
         """Return a part of a product, given the friction of the membrane."""
         pieces = bed_pieces(part.model, part.mesh, membrane)
         hulls = [(part.X_AP @ hull.T).T for hull in pieces.hulls]
-        return HeldPart(solid, samples_of(solid), hulls, pieces.friction, pieces.own)
+        return HeldPart(samples_of(solid), hulls, pieces.friction, pieces.own)
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,6 +73,7 @@ class FrozenBody:
 
 def frozen_body(
     parts: Sequence[HeldPart],
+    solids: Sequence[Solid],
     R_JA: np.ndarray,
     p_middle: np.ndarray,
     jig: JigParameters,
@@ -84,7 +83,8 @@ def frozen_body(
     """Press a body into the bed, freeze it, and return what holds the body.
 
     Args:
-        parts: Of the body.
+        parts: Of the body, those that reach the bed.
+        solids: All parts of the body, for its weight.
         R_JA: (3, 3) posture.
         p_middle: (2,) point of the turned body, in the plane, that goes to the middle of the bag.
         jig: Bag, beads, pump and frozen bed.
@@ -117,9 +117,8 @@ def frozen_body(
         (seal, Pins.inside(mesh, outside, X_JA, gradient)),
         (jig.suction, vacuum),
     )
-    solids = {part.solid.name: part.solid for part in parts}
-    p_JG = R_JA @ combined_cog(solids, list(solids)) + sunk.p_JA
-    weight = GRAVITY * sum(solid.mass for solid in solids.values())
+    p_JG = R_JA @ combined_cog({solid.name: solid for solid in solids}, [s.name for s in solids])
+    p_JG, weight = p_JG + sunk.p_JA, GRAVITY * sum(solid.mass for solid in solids)
     return FrozenBody(contacts, p_JG, weight, sunk.p_JA, sunk.depth)
 
 

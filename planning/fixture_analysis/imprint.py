@@ -43,7 +43,8 @@ class Imprint:
         volume: Of the imprint below the surface of the undisturbed bag [m3].
         excess: Volume of displaced beads that the bed around the body could not take up [m3].
         cell: Edge of a cell [m].
-        bed: (n, n) height of the bed above the body's lowest point, collar included [m].
+        bed: (n, n) height of the soft bed above the body's lowest point, collar included [m].
+        frozen: (n, n) the same when frozen: lower beside the body, which has dragged it down.
         under: (n, n) height of the body's underside above its lowest point [m]; inf where none.
         contact: Outline of the bearing area, or None if it has no extent.
     """
@@ -54,6 +55,7 @@ class Imprint:
     excess: float
     cell: float
     bed: np.ndarray
+    frozen: np.ndarray
     under: np.ndarray
     contact: Footprint | None
 
@@ -66,7 +68,8 @@ class Imprint:
         """Return heights [m] and lower edges [m] of the imprint's walls ahead of a push.
 
         A wall is between a cell that the body fills and the next one along the push; it reaches
-        from the body's underside up to the bed, or to an overhanging underside, in that cell.
+        from the body's underside up to the frozen bed, or to an overhanging underside, in that
+        cell.
         Lower edges are above the body's lowest point.
 
         Args:
@@ -76,7 +79,7 @@ class Imprint:
             Two (m,) arrays; each wall is one cell wide.
         """
         axis, sign = int(np.argmax(np.abs(direction))), int(np.sign(direction @ [1, 1]))
-        ahead = np.minimum(self.bed, self.under)
+        ahead = np.minimum(self.frozen, self.under)
         ahead = np.roll(ahead, -sign, axis=axis)  # The border of the grid is outside the bag.
         height = np.where(np.isfinite(self.under), ahead - self.under, 0.0)
         inside = height > 0.0
@@ -219,7 +222,8 @@ def press(
     force: float,
 ) -> Imprint:
     """Return the imprint of a body that is pressed into the bed; arguments as of `pressed`."""
-    return _imprint(pressed(parts, R_JA, p_middle, jig, force))
+    body = pressed(parts, R_JA, p_middle, jig, force)
+    return _imprint(body, jig.vacuum.contraction * jig.vacuum.closing(jig.vacuum.pressure))
 
 
 @dataclass(frozen=True, eq=False)
@@ -271,8 +275,13 @@ def _bed_of(jig: JigParameters) -> Bed:
     return Bed(jig.bag, jig.soil)
 
 
-def _imprint(body: Pressed) -> Imprint:
-    """Return the imprint: the bed's surface and the body's underside above it."""
+def _imprint(body: Pressed, contraction: float) -> Imprint:
+    """Return the imprint: the bed's surface, soft and frozen, and the body's underside above it.
+
+    Args:
+        body: In the soft bed, which is frozen.
+        contraction: Volumetric shrinkage of the bed when it freezes.
+    """
     bed, points = body.bed, body.points
     low, cell = bed.bag.cap_height - body.depth, bed.bag.cell
     at = np.rint((points[:, :2] - bed.axis[0]) / cell).astype(int)
@@ -282,5 +291,7 @@ def _imprint(body: Pressed) -> Imprint:
     bearing = bed.active & (under < bed.heights + BEARING)
     volume = float(np.maximum(body.cap - bed.heights, 0.0).sum()) * cell**2
     outline = footprint(np.column_stack([bed.x[bearing], bed.y[bearing]]))
-    excess, relative = bed.ledger.waiting, (bed.heights - low, under - low)
-    return Imprint(body.depth, body.force, volume, excess, cell, *relative, outline)
+    excess, soft = bed.ledger.waiting, bed.heights - low
+    bed.jam(contraction)
+    frozen = bed.heights - low
+    return Imprint(body.depth, body.force, volume, excess, cell, soft, frozen, under - low, outline)
