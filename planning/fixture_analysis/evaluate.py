@@ -289,11 +289,6 @@ class _Evaluation:
             f"withstands {capacity:.1f} N sideways at that height, the operation may exert "
             f"{load.sideways:.1f} N"
         )
-        if self.mapped:
-            self.notes.append(
-                f"by the holding map it bears {margin.across:.1f} times the load of the operation"
-                + (f"; first: {margin.criterion}" if margin.criterion else " or more")
-            )
         if margin.turning < 1.0:
             # The hand that takes the torque has gripped the body, and takes a sideways force too.
             self.notes.append(
@@ -303,6 +298,11 @@ class _Evaluation:
             )
         elif margin.across < 1.0:
             raise Rejected(f"it {across}")
+        if self.mapped:
+            self.notes.append(
+                f"by the holding map it bears {margin.across:.1f} times the load of the operation"
+                + (f"; first: {margin.criterion}" if margin.criterion else " or more")
+            )
         return margin.across
 
     def _margin(self, imprint: Imprint) -> Margin:
