@@ -11,11 +11,13 @@ score.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from cell.fixtures import FixtureError
 from cell.products.product import Product
 from planning.feasibility.algorithm import FixingStep
 from planning.feasibility.directions import DIRECTIONS, open_directions, opposite
@@ -109,7 +111,8 @@ def _judged(
     while first:
         number = first.pop()
         formula.discard(number)
-        found[number] = evaluator.evaluate(proposals[number], mapped=True)
+        with suppress(FixtureError):  # What no jig can hold stays with the formula.
+            found[number] = evaluator.evaluate(proposals[number], mapped=True)
         best = min(found, key=order)
         first += [best] if best in formula and not first else []
     return [found[number] for number in sorted(found, key=order)]
