@@ -128,8 +128,8 @@ def test_grids_and_samples_are_read_from_text() -> None:
 @pytest.mark.parametrize(
     ("arguments", "culprit"),
     [
-        (["nosuch"], "No experiment 'nosuch'. Known: FILE.py:FUNCTION, assemble"),
-        ([f"{SCRIPT}:nosuch"], "No function in"),
+        (["qqq"], "No experiment 'qqq'. Known: FILE.py:FUNCTION, assemble"),
+        ([f"{SCRIPT}:qqq"], "No function in"),
         ([f"{SCRIPT}:with_positional_option"], "option 'option' must come after"),
         (["/no/such/file.py:f"], "No file '/no/such/file.py'"),
         (["push", "--grid", "push.sped=1,2"], "Did you mean 'push.speed'?"),
@@ -142,7 +142,7 @@ def test_grids_and_samples_are_read_from_text() -> None:
         (["push", "--grid", "push.speed=0.2", "--sample", "push.speed=0.1:0.3"], "both in a grid"),
         (["push", "--seeds", "0"], "--seeds must be at least 1"),
         (["push", "--workers", "0"], "--workers must be at least 1"),
-        (["push", "--product", "nosuch"], "nosuch"),
+        (["push", "--product", "qqq"], "qqq"),
     ],
 )
 def test_bad_input_is_one_line_before_any_trial(

@@ -90,7 +90,7 @@ def embedded(width: float, depth: float, cell: float = 1e-4) -> Imprint:
     corners = np.array([[-half, -half], [half, -half], [half, half], [-half, half]])
     bed = np.full(grid.shape, depth)
     bed[3:-3, 3:-3] = 0.0
-    return Imprint(depth, 20.0, 0.0, 0.0, cell, bed, grid, footprint(corners))
+    return Imprint(depth, 20.0, 0.0, 0.0, cell, bed, bed, grid, footprint(corners))
 
 
 @pytest.mark.parametrize(("depth", "expected"), [(5e-3, 2.2), (10e-3, 6.6), (15e-3, 13.8)])

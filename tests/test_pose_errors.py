@@ -37,10 +37,10 @@ def test_error_has_its_size_and_leaves_everything_else(
     """A turn leaves the mass centre where it is; a shift does not turn."""
     size = 0.02
     truth, erring = sources(motor_unit_cell, component, size)
-    X_WP = truth.look(["motor"])["motor"].X_WP
+    X_WP = truth.look(["motor"], {})["motor"].X_WP
     centre = motor_unit_cell.parts["motor"].part.mesh.center_mass
     for _ in range(20):
-        X_WQ = erring.look(["motor"])["motor"].X_WP
+        X_WQ = erring.look(["motor"], {})["motor"].X_WP
         turn = (X_WQ.rotation() @ X_WP.rotation().inverse()).ToAngleAxis()
         shift = X_WQ @ centre - X_WP @ centre
         turned = turn.angle() * turn.axis()
@@ -53,11 +53,11 @@ def test_error_has_its_size_and_leaves_everything_else(
 
 def test_every_look_at_every_part_errs_in_another_direction(motor_unit_cell: Cell) -> None:
     _, erring = sources(motor_unit_cell, "lateral", 0.001)
-    places = [X.X_WP.translation() for _ in range(3) for X in erring.look(["motor"]).values()]
+    places = [X.X_WP.translation() for _ in range(3) for X in erring.look(["motor"], {}).values()]
     assert np.ptp(places, axis=0).max() > 1e-4
     truth, erring = sources(motor_unit_cell, "lateral", 0.001)
     one, other = (
-        erring.look([n])[n].X_WP.translation() - truth.look([n])[n].X_WP.translation()
+        erring.look([n], {})[n].X_WP.translation() - truth.look([n], {})[n].X_WP.translation()
         for n in ("motor", "plate")
     )
     assert np.linalg.norm(one - other) > 1e-5
@@ -65,7 +65,7 @@ def test_every_look_at_every_part_errs_in_another_direction(motor_unit_cell: Cel
 
 def test_no_error_is_the_truth_to_the_last_bits(motor_unit_cell: Cell) -> None:
     truth, erring = sources(motor_unit_cell, "tilt", 0.0)
-    seen, true = erring.look(["plate"])["plate"].X_WP, truth.look(["plate"])["plate"].X_WP
+    seen, true = erring.look(["plate"], {})["plate"].X_WP, truth.look(["plate"], {})["plate"].X_WP
     assert seen.IsNearlyEqualTo(true, 1e-15)
     assert isinstance(seen, RigidTransform)
 

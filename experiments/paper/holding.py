@@ -12,19 +12,21 @@ from pydrake.multibody.math import SpatialForce
 from pydrake.systems.analysis import Simulator
 from pydrake.systems.framework import Context
 
+from cell.bodies import full_name
 from cell.errors import RunFailure
+from cell.fixtures.soft_jig import SoftJig
 from cell.forces import applied_force
 from experiments.paper.rig.rig import Rig
 from experiments.paper.rig.rig_simulation import RigSimulation
-from planning.operations.measures import angle_between
+from planning.fixture_analysis.holding_map import ANGLE, WAY, Bearing
 
 RATE, MOST = 20.0, 40.0  # Of a force [N/s], [N]; faster ramps overstate holding by 1 to 2 N [M].
 TURN_RATE, TURN_MOST = 0.5, 1.5  # Of a moment [N m/s], [N m].
-AWAY, TURNED = 1e-3, np.deg2rad(2.0)  # At which the part no longer counts as held [m], [rad].
 
 SIDEWAYS = tuple(f"force {way}" for way in ("+x", "-x", "+y", "-y"))  # In J.
 LIFT = "force +z"
 LOADS = (*SIDEWAYS, LIFT, "moment x", "moment y", "moment z")
+NOTHING = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -43,8 +45,6 @@ class Held:
 def holding(simulation: RigSimulation, loads: Sequence[str] = LOADS) -> Mapping[str, Held]:
     """Return what the placed part bears at its mass centre, by direction: "force +x", "moment z".
 
-    Each pull starts from the same state, a copy of the simulation's; the simulation is not changed.
-
     Args:
         simulation: Of a rig whose hand has let go and is away.
         loads: Those of `LOADS` that are wanted.
@@ -53,17 +53,21 @@ def holding(simulation: RigSimulation, loads: Sequence[str] = LOADS) -> Mapping[
     for load in loads:
         kind, way = load.split()
         axis = np.eye(3)["xyz".index(way[-1])] * (-1.0 if way[0] == "-" else 1.0)
-        if kind == "force":
-            found[load] = _pull(simulation, np.zeros(3), RATE * axis, MOST / RATE)
-        else:
-            found[load] = _pull(simulation, TURN_RATE * axis, np.zeros(3), TURN_MOST / TURN_RATE)
+        unit = (np.zeros(3), axis) if kind == "force" else (axis, np.zeros(3))
+        bearing = pull(simulation, np.concatenate(unit))
+        found[load] = Held(bearing.load, bearing.moved)
     return found
 
 
-def _pull(
-    simulation: RigSimulation, turning: np.ndarray, pushing: np.ndarray, seconds: float
-) -> Held:
-    """Return at which load the part moves, under a moment and a force that grow at rates (3,)."""
+def pull(simulation: RigSimulation, direction: np.ndarray) -> Bearing:
+    """Load a placed part with a slow ramp until it moves; the simulation is not changed.
+
+    Each pull starts from the same state, a copy of the simulation's.
+
+    Args:
+        simulation: Of a rig whose hand has let go and is away.
+        direction: (6,) unit moment or unit force at the mass centre, in J.
+    """
     rig, body = simulation.rig, simulation.rig.part.body
     simulator = Simulator(rig.diagram, simulation.root.Clone())
     simulator.set_monitor(rig.monitor)
@@ -72,21 +76,64 @@ def _pull(
     simulator.Initialize()
     forces = rig.diagram.GetSubsystemByName("forces")
     port, context = forces.GetInputPort("external"), forces.GetMyMutableContextFromRoot(root)
-    p_com = rig.part.part.mesh.center_mass
-    rate = float(np.linalg.norm(turning) + np.linalg.norm(pushing))
-    start, begun = _pose(rig, root), root.get_time()
+    p_PG = rig.part.part.mesh.center_mass
+    rate, most = (TURN_RATE, TURN_MOST) if direction[:3].any() else (RATE, MOST)
+    watch, begun = _Watch(rig, root), root.get_time()
     time_step = rig.config.simulation.time_step
-    for k in range(1, round(seconds / time_step) + 1):
-        wrench = SpatialForce(k * time_step * turning, k * time_step * pushing)
-        port.FixValue(context, Value([applied_force(body.index(), p_com, wrench)]))
+    rows = [np.zeros(9)]
+    for k in range(1, round(most / rate / time_step) + 1):
+        load = rate * k * time_step
+        wrench = SpatialForce(load * direction[:3], load * direction[3:])
+        port.FixValue(context, Value([applied_force(body.index(), p_PG, wrench)]))
         try:
             simulator.AdvanceTo(begun + k * time_step)
         except (RunFailure, RuntimeError):  # The bed tears, or the part is thrown off.
-            return Held(rate * k * time_step, moved=True)
-        now = _pose(rig, root)
-        if np.linalg.norm(now @ p_com - start @ p_com) > AWAY or angle_between(start, now) > TURNED:
-            return Held(rate * k * time_step, moved=True)
-    return Held(rate * seconds, moved=False)
+            rows.append(np.array([load, np.pi, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0]))
+            break
+        rows.append(np.array([load, *watch.motion(p_PG), *watch.bed()]))
+        if np.linalg.norm(rows[-1][4:7]) > WAY or np.linalg.norm(rows[-1][1:4]) > ANGLE:
+            break
+    table = np.array(rows)
+    return Bearing.of(table[:, 0], table[:, 1:7], watch.height(p_PG), table[:, 7], table[:, 8])
+
+
+class _Watch:
+    """What has become of a part and its fixture since a pull began."""
+
+    def __init__(self, rig: Rig, root: Context) -> None:
+        self._rig, self._root, self._start = rig, root, _pose(rig, root)
+        self._name = full_name(rig.part.body)
+        self._vertices, self._sealed = self._surface(), self._suction()
+
+    def height(self, p_PG: np.ndarray) -> float:
+        """Return the height of the mass centre over the lowest point of the part [m]."""
+        up = self._start.rotation().matrix()[2]
+        return float(up @ p_PG - (self._rig.part.part.mesh.vertices @ up).min())
+
+    def motion(self, p_PG: np.ndarray) -> np.ndarray:
+        """Return rotation [rad] and translation [m] of the mass centre (6,), in J."""
+        now = _pose(self._rig, self._root)
+        turn = (now.rotation() @ self._start.rotation().inverse()).ToAngleAxis()
+        return np.concatenate([turn.angle() * turn.axis(), now @ p_PG - self._start @ p_PG])
+
+    def bed(self) -> tuple[float, float]:
+        """Return how far the bed has given way for good [m], and the share of suction lost."""
+        moves = self._surface() - self._vertices
+        way = float(np.linalg.norm(moves, axis=1).max(initial=0.0))
+        return way, 1.0 - self._suction() / self._sealed if self._sealed else 0.0
+
+    def _surface(self) -> np.ndarray:
+        """Return the vertices (n, 3) of the bed [m]; none of a fixture that does not yield."""
+        fixture = self._rig.fixture
+        return fixture.memory(self._root).mesh.vertices if isinstance(fixture, SoftJig) else NOTHING
+
+    def _suction(self) -> float:
+        """Return the area that is still sealed [m2]."""
+        fixture = self._rig.fixture
+        if not isinstance(fixture, SoftJig):
+            return 0.0
+        seal = fixture.memory(self._root).holding.seals.get(self._name)
+        return float(seal.intact @ seal.areas) if seal else 0.0
 
 
 def _pose(rig: Rig, root: Context) -> RigidTransform:

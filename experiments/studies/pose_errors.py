@@ -6,7 +6,7 @@ others start from one of these states, so each step is tried by itself, after go
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -82,9 +82,9 @@ class ErringSource:
     def __post_init__(self) -> None:
         self.duration = self.source.duration
 
-    def look(self, parts: Sequence[str]) -> dict[str, Estimate]:
+    def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
         """Return what is seen now, each pose off by an error of its own."""
-        seen = self.source.look(parts)
+        seen = self.source.look(parts, known)
         return {n: replace(each, X_WP=self._off(n, each.X_WP)) for n, each in seen.items()}
 
     def _off(self, name: str, X_WP: RigidTransform) -> RigidTransform:

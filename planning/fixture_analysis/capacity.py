@@ -10,7 +10,8 @@ p: vacuum, phi: friction angle of the beads, W: weight, b: from the centre of gr
 tips over, h: height of the push. [D] Mohr-Coulomb soil whose confinement is the vacuum (Rankine's
 passive pressure; 132 kPa for 90 kPa and 25 degrees), the same as in the simulation. The weight of
 the beads is neglected (0.4 kPa at 10 mm), suction and adhesion too. The walls are those of the
-imprint, cell by cell. A load that presses down during the push adds to W at its own lever.
+frozen imprint, cell by cell: lower than it is deep, because the ground beside a sinking body goes
+down with it. A load that presses down during the push adds to W at its own lever.
 """
 
 from __future__ import annotations

@@ -13,11 +13,12 @@ from planning.feasibility.directions import axis_index, unit_vector
 from planning.feasibility.matrices import AssemblyMatrices
 from planning.feasibility.solids import combined_cog
 from planning.fixture_analysis.candidate import Candidate, FixtureSetup, Proposal
-from planning.fixture_analysis.capacity import sideways_capacity, turning_capacity
 from planning.fixture_analysis.footprint import USUAL_DEPTH, footprint, standing_points
+from planning.fixture_analysis.frozen_body import FrozenBody, HeldPart, frozen_body
 from planning.fixture_analysis.grip import GripAnalysis
 from planning.fixture_analysis.imprint import Imprint, PartSurface, depth_in_bed, press, samples_of
 from planning.fixture_analysis.loads import operation_load
+from planning.fixture_analysis.margins import Margin, margin_by_formula, margin_by_map
 from planning.fixture_analysis.support import SupportAnalysis
 
 GRAVITY = 9.81  # [m/s2]
@@ -40,10 +41,17 @@ class Evaluator:
         self._lows: dict[tuple[str, bytes], float] = {}
         self._samples: dict[str, PartSurface] = {}
         self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
+        self._held_parts: dict[str, HeldPart] = {}
+        self._frozen: dict[tuple[tuple[str, ...], str, bytes], FrozenBody] = {}
 
-    def evaluate(self, proposal: Proposal) -> Candidate:
-        """Run the tests and return the candidate with figures, and scores or the reason."""
-        evaluation = _Evaluation(self, proposal)
+    def evaluate(self, proposal: Proposal, *, mapped: bool = False) -> Candidate:
+        """Run the tests and return the candidate with figures, and scores or the reason.
+
+        Args:
+            proposal: What is to be held, and how.
+            mapped: Whether the holding map says what the body bears, not the formula.
+        """
+        evaluation = _Evaluation(self, proposal, mapped)
         scores: dict[str, float] = {}
         rejected = ""
         try:
@@ -89,12 +97,34 @@ class Evaluator:
             self._imprints[key] = press(parts, R_JA, p_middle, self.setup.jig, force)
         return self._imprints[key]
 
+    def frozen(
+        self, body: Sequence[str], up: str, R_JA: np.ndarray, p_middle: np.ndarray
+    ) -> FrozenBody:
+        """Return a body in the frozen bed; parts far above the bed do not touch it."""
+        reach = self.lowest(body, R_JA) + self.setup.jig.bag.cap_height
+        key = tuple(body), up, p_middle.tobytes()
+        if key not in self._frozen:
+            membrane, solids = self.setup.jig.jammed.friction, self.matrices.solids
+            for name in (name for name in body if name not in self._held_parts):
+                part = self.product.parts[name]
+                self._held_parts[name] = HeldPart.of(part, solids[name], membrane)
+            reaching = [n for n in body if self.lowest((n,), R_JA) <= reach]
+            self._frozen[key] = frozen_body(
+                [self._held_parts[name] for name in reaching],
+                [solids[name] for name in body],
+                R_JA,
+                p_middle,
+                self.setup.jig,
+                self.setup.press_force,
+            )
+        return self._frozen[key]
+
 
 class _Evaluation:
     """One candidate under evaluation, with its figures and notes so far."""
 
-    def __init__(self, shared: Evaluator, proposal: Proposal) -> None:
-        self.shared, self.proposal = shared, proposal
+    def __init__(self, shared: Evaluator, proposal: Proposal, mapped: bool) -> None:
+        self.shared, self.proposal, self.mapped = shared, proposal, mapped
         self.solids, self.setup = shared.matrices.solids, shared.setup
         self.R_JA = rotation_with_up(proposal.up).matrix()
         self.figures: dict[str, float] = {}
@@ -252,13 +282,35 @@ class _Evaluation:
 
     def _holding_margin(self, imprint: Imprint) -> float:
         """Return the sideways force that the body withstands, per force of the operation."""
-        body, jig = self.proposal.body, self.setup.jig
-        p_G = (self.R_JA @ combined_cog(self.solids, body))[:2] - self.p_middle
-        weight = GRAVITY * sum(self.solids[name].mass for name in body)
-        margins = []
-        for piece in self.shared.support.components(self.proposal.moved):
-            load = operation_load(
-                self.shared.product,
+        margin = self._margin(imprint)
+        load, capacity = margin.load, margin.across * margin.load.sideways
+        self.figures |= {"bears_across_N": capacity, "pushed_across_N": load.sideways}
+        across = (
+            f"withstands {capacity:.1f} N sideways at that height, the operation may exert "
+            f"{load.sideways:.1f} N"
+        )
+        if margin.turning < 1.0:
+            # The hand that takes the torque has gripped the body, and takes a sideways force too.
+            self.notes.append(
+                f"a counter-hold against {load.torque:.2f} N m is needed: the bed withstands "
+                f"{margin.turning * load.torque:.2f} N m"
+                + (f"; it {across}" if margin.across < 1.0 else "")
+            )
+        elif margin.across < 1.0:
+            raise Rejected(f"it {across}")
+        if self.mapped:
+            self.notes.append(
+                f"by the holding map it bears {margin.across:.1f} times the load of the operation"
+                + (f"; first: {margin.criterion}" if margin.criterion else " or more")
+            )
+        return margin.across
+
+    def _margin(self, imprint: Imprint) -> Margin:
+        """Return how often the body bears the loads, by the formula or by the map."""
+        body, shared = self.proposal.body, self.shared
+        loads = [
+            operation_load(
+                shared.product,
                 self.solids,
                 self.setup,
                 self.proposal,
@@ -266,22 +318,14 @@ class _Evaluation:
                 self.p_middle,
                 self.low,
             )
-            capacity = sideways_capacity(imprint, jig, weight, p_G, load)
-            margins.append((capacity / load.sideways, capacity, load))
-        margin, capacity, load = min(margins, key=lambda entry: entry[0])
-        self.figures |= {"bears_across_N": capacity, "pushed_across_N": load.sideways}
-        if margin < 1.0:
-            raise Rejected(
-                f"it withstands {capacity:.1f} N sideways at that height, the operation may exert "
-                f"{load.sideways:.1f} N"
-            )
-        turning = turning_capacity(imprint, jig, weight, load)
-        if load.torque > turning:
-            self.notes.append(
-                f"a counter-hold against {load.torque:.2f} N m is needed: friction under it "
-                f"withstands {turning:.2f} N m"
-            )
-        return margin
+            for piece in shared.support.components(self.proposal.moved)
+        ]
+        if self.mapped:
+            held = shared.frozen(body, self.proposal.up, self.R_JA, self.p_middle)
+            return margin_by_map(held, np.array([0.0, 0.0, held.p_JA[2] + self.low]), loads)
+        p_G = (self.R_JA @ combined_cog(self.solids, body))[:2] - self.p_middle
+        weight = GRAVITY * sum(self.solids[name].mass for name in body)
+        return margin_by_formula(imprint, self.setup.jig, weight, p_G, loads)
 
 
 def _listed(names: Sequence[str]) -> str:

@@ -43,7 +43,8 @@ class Imprint:
         volume: Of the imprint below the surface of the undisturbed bag [m3].
         excess: Volume of displaced beads that the bed around the body could not take up [m3].
         cell: Edge of a cell [m].
-        bed: (n, n) height of the bed above the body's lowest point, collar included [m].
+        bed: (n, n) height of the soft bed above the body's lowest point, collar included [m].
+        frozen: (n, n) the same when frozen: lower beside the body, which has dragged it down.
         under: (n, n) height of the body's underside above its lowest point [m]; inf where none.
         contact: Outline of the bearing area, or None if it has no extent.
     """
@@ -54,6 +55,7 @@ class Imprint:
     excess: float
     cell: float
     bed: np.ndarray
+    frozen: np.ndarray
     under: np.ndarray
     contact: Footprint | None
 
@@ -66,7 +68,8 @@ class Imprint:
         """Return heights [m] and lower edges [m] of the imprint's walls ahead of a push.
 
         A wall is between a cell that the body fills and the next one along the push; it reaches
-        from the body's underside up to the bed, or to an overhanging underside, in that cell.
+        from the body's underside up to the frozen bed, or to an overhanging underside, in that
+        cell.
         Lower edges are above the body's lowest point.
 
         Args:
@@ -76,7 +79,7 @@ class Imprint:
             Two (m,) arrays; each wall is one cell wide.
         """
         axis, sign = int(np.argmax(np.abs(direction))), int(np.sign(direction @ [1, 1]))
-        ahead = np.minimum(self.bed, self.under)
+        ahead = np.minimum(self.frozen, self.under)
         ahead = np.roll(ahead, -sign, axis=axis)  # The border of the grid is outside the bag.
         height = np.where(np.isfinite(self.under), ahead - self.under, 0.0)
         inside = height > 0.0
@@ -154,13 +157,34 @@ def _one_per_cell(samples: SurfaceSamples, cell: float) -> SurfaceSamples:
     return SurfaceSamples(samples.name, under.points, normals, areas)
 
 
-def press(
+@dataclass(frozen=True, eq=False)
+class Pressed:
+    """A body that has been pressed into a bed.
+
+    Attributes:
+        bed: Soft, with the body in it; the next body is pressed into the same one, inflated anew.
+        cap: (n, n) its surface before [m].
+        p_JA: (3,) place of the product frame; its rotation is the posture [m].
+        points: (m, 3) points of the body that face down, in J [m].
+        depth: Of the lowest point below the apex [m].
+        force: That the bed bears [N].
+    """
+
+    bed: Bed
+    cap: np.ndarray
+    p_JA: np.ndarray
+    points: np.ndarray
+    depth: float
+    force: float
+
+
+def pressed(
     parts: Iterable[PartSurface],
     R_JA: np.ndarray,
     p_middle: np.ndarray,
     jig: JigParameters,
     force: float,
-) -> Imprint:
+) -> Pressed:
     """Press a body into the bed.
 
     Args:
@@ -186,7 +210,20 @@ def press(
     cap = bed.heights.copy()
     descent = _Descent(bed, body, p_middle, apex - lowest)
     depth, borne = descent.down_to(force, apex - jig.bag.floor)
-    return _imprint(bed, cap, points + [*(-p_middle), apex - depth - lowest], depth, borne)
+    p_JA = np.array([*(-p_middle), apex - depth - lowest])
+    return Pressed(bed, cap, p_JA, points + p_JA, depth, borne)
+
+
+def press(
+    parts: Iterable[PartSurface],
+    R_JA: np.ndarray,
+    p_middle: np.ndarray,
+    jig: JigParameters,
+    force: float,
+) -> Imprint:
+    """Return the imprint of a body that is pressed into the bed; arguments as of `pressed`."""
+    body = pressed(parts, R_JA, p_middle, jig, force)
+    return _imprint(body, jig.vacuum.contraction * jig.vacuum.closing(jig.vacuum.pressure))
 
 
 @dataclass(frozen=True, eq=False)
@@ -238,24 +275,23 @@ def _bed_of(jig: JigParameters) -> Bed:
     return Bed(jig.bag, jig.soil)
 
 
-def _imprint(bed: Bed, cap: np.ndarray, points: np.ndarray, depth: float, borne: float) -> Imprint:
-    """Return the imprint: the bed's surface and the body's underside above it.
+def _imprint(body: Pressed, contraction: float) -> Imprint:
+    """Return the imprint: the bed's surface, soft and frozen, and the body's underside above it.
 
     Args:
-        bed: After the push.
-        cap: (n, n) its surface before [m].
-        points: (m, 3) points of the body that face down, in J.
-        depth: Of the lowest point below the apex [m].
-        borne: What the bed bears [N].
+        body: In the soft bed, which is frozen.
+        contraction: Volumetric shrinkage of the bed when it freezes.
     """
-    low, cell = bed.bag.cap_height - depth, bed.bag.cell
+    bed, points = body.bed, body.points
+    low, cell = bed.bag.cap_height - body.depth, bed.bag.cell
     at = np.rint((points[:, :2] - bed.axis[0]) / cell).astype(int)
     inside = np.all((at >= 0) & (at < len(bed.axis)), axis=1)
     under = np.full(bed.heights.shape, np.inf)
     np.minimum.at(under, tuple(at[inside].T), points[inside, 2])
     bearing = bed.active & (under < bed.heights + BEARING)
-    volume = float(np.maximum(cap - bed.heights, 0.0).sum()) * cell**2
+    volume = float(np.maximum(body.cap - bed.heights, 0.0).sum()) * cell**2
     outline = footprint(np.column_stack([bed.x[bearing], bed.y[bearing]]))
-    return Imprint(
-        depth, borne, volume, bed.ledger.waiting, cell, bed.heights - low, under - low, outline
-    )
+    excess, soft = bed.ledger.waiting, bed.heights - low
+    bed.jam(contraction)
+    frozen = bed.heights - low
+    return Imprint(body.depth, body.force, volume, excess, cell, soft, frozen, under - low, outline)

@@ -11,11 +11,13 @@ score.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from cell.fixtures import FixtureError
 from cell.products.product import Product
 from planning.feasibility.algorithm import FixingStep
 from planning.feasibility.directions import DIRECTIONS, open_directions, opposite
@@ -74,11 +76,46 @@ def _ranked(evaluator: Evaluator, step: FixingStep, assembled: tuple[str, ...]) 
         )
         for up in DIRECTIONS
     ]
-    evaluated = [evaluator.evaluate(proposal) for proposal in proposals]
-    ranked = sorted(evaluated, key=lambda c: (bool(c.rejected), -c.score))
     body = step.incoming if step.posture == opposite(step.up) else step.target
+    ranked = _judged(evaluator, proposals, (body, step.up))
     paper = next(k for k, c in enumerate(ranked) if c.body == body and c.up == step.up)
     return Choice(step.item, tuple(ranked), paper, _verdict(ranked, paper))
+
+
+def _judged(
+    evaluator: Evaluator, proposals: Sequence[Proposal], chosen: tuple[tuple[str, ...], str]
+) -> list[Candidate]:
+    """Return the candidates ranked, the best and Algorithm 1's choice judged by the holding map.
+
+    The formula ranks all of them first. What it puts first is judged by the map, which takes a
+    hundred times as long, until one that was judged stays first. Parts without a model, which no
+    cell can hold, stay with the formula.
+
+    Args:
+        evaluator: Of the plan.
+        proposals: All candidates of a step.
+        chosen: Body and posture of Algorithm 1's choice.
+    """
+    found = {number: evaluator.evaluate(proposal) for number, proposal in enumerate(proposals)}
+    models = {name for name, part in evaluator.product.parts.items() if part.model is not None}
+    formula = {
+        number
+        for number, candidate in found.items()
+        if "bears_across_N" in candidate.figures and set(candidate.body) <= models
+    }
+
+    def order(number: int) -> tuple[bool, float]:
+        return bool(found[number].rejected), -found[number].score
+
+    first = [k for k in formula if (proposals[k].body, proposals[k].up) == chosen]
+    while first:
+        number = first.pop()
+        formula.discard(number)
+        with suppress(FixtureError):  # What no jig can hold stays with the formula.
+            found[number] = evaluator.evaluate(proposals[number], mapped=True)
+        best = min(found, key=order)
+        first += [best] if best in formula and not first else []
+    return [found[number] for number in sorted(found, key=order)]
 
 
 def _verdict(ranked: Sequence[Candidate], paper: int) -> str:
