@@ -28,7 +28,7 @@ import yaml
 ROOT = Path(__file__).resolve().parent.parent
 GOAL = 0.9
 LIBRARIES = (
-    "hypothesis", "manifold3d", "matplotlib.figure", "ompl.base", "pyarrow.parquet", "pydrake.all",
+    "hypothesis", "manifold3d", "matplotlib.figure", "ompl.base", "pydrake.all",
     "rich.console", "scipy.optimize", "scipy.stats", "trimesh", "tyro", "yaml",
 )  # fmt: skip
 CPU_LIMIT = 180  # [s] Of the tests of one mutant: one that loops for ever is caught by it.
@@ -120,7 +120,9 @@ def outcome(folder: Path, mutant: Mutant, number: int) -> str:
 def main() -> int:
     """Print the table; return 0 if the goal is met."""
     os.nice(19)
-    os.environ["OPENBLAS_NUM_THREADS"] = "1"  # A process with threads is not to be forked.
+    os.environ["OPENBLAS_NUM_THREADS"] = (
+        "1"  # A process with threads is not to be forked: no pyarrow, either.
+    )
     for name in LIBRARIES:
         with suppress(ImportError):
             import_module(name)
