@@ -60,6 +60,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "speed": {"reporting", "assembly"},
         "vision": set(),
         "jig": {"campaigns"},
+        "calibration": {"reporting", "campaigns", "jig"},
         "paper": {"reporting", "campaigns", "speed"},
         "compare": {"reporting", "campaigns"},
         "regress": {"reporting", "campaigns", "speed", "jig", "paper", "compare"},

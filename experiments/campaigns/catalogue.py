@@ -24,6 +24,7 @@ BUILT_IN = {
     "place": "experiments.paper.trial_tasks:place",
     "push": "experiments.paper.trial_tasks:push",
     "hold": "experiments.jig.holding:hold",
+    "bench": "experiments.calibration.bench:bench",
 }
 
 

@@ -22,7 +22,7 @@ from pydrake.multibody.tree import (
     SpatialInertia,
 )
 from pydrake.systems.analysis import Simulator
-from pydrake.systems.framework import DiagramBuilder
+from pydrake.systems.framework import Context, DiagramBuilder
 
 from cell.errors import RunFailure
 from cell.fixtures.soft_jig import JigParameters, SoftJig
@@ -162,19 +162,29 @@ class ElementRig:
         self.step(round(0.1 / self.time_step))
         return np.array(curve)
 
+    def saved(self) -> Context:
+        """Return a copy of the state."""
+        return self.root.Clone()
+
+    def restore(self, saved: Context) -> None:
+        """Go back to a state that `saved` has returned."""
+        self.root.SetTimeStateAndParametersFrom(saved)
+        self._steps = round(saved.get_time() / self.time_step)
+        self.simulator.Initialize()
+
     @property
     def bed_force(self) -> float:
         """Upward force of the soft bed on the part [N]."""
         forces = self.jig.memory(self.root).forces
         return float(forces[0].F_Bq_W.translational()[2]) if forces else 0.0
 
-    def jam(self) -> None:
-        """Evacuate until the bed is frozen, then stop the carriage where it is."""
+    def jam(self, wait: float = 0.5) -> None:
+        """Evacuate until the bed is frozen, stop the carriage where it is, and wait [s]."""
         self.jig.evacuate(self.root)
         while not self.jig.fixed(self.root):
             self.step()
         self._set_height(self.params.bag.cap_height - self.depth, 0.0)
-        self.step(round(0.5 / self.time_step))
+        self.step(round(wait / self.time_step))
 
     def let_go(self, wait: float = 0.5) -> None:
         """Open the grip of the carriage, which nothing touches, and wait [s]."""

@@ -18,6 +18,7 @@ from cell.fixtures.soft_jig.frozen.yielding import Strength
 from cell.fixtures.soft_jig.parameters import FULL_VACUUM
 from cell.fixtures.soft_jig.soft.bed import Bed
 from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
+from experiments.jig.curves import Curve
 from experiments.jig.element_rig import Drag, ElementRig
 from experiments.jig.specimens import FRICTION, Prism
 
@@ -130,15 +131,29 @@ def punch(
     if not membrane:
         soil = replace(soil, membrane_modulus=0.0, gravity_pressure=REFERENCE_PRESSURE)
     bed = Bed(params.bag, soil)
-    samples = SurfaceSamples.of("punch", CYLINDER.mesh())
+    curve = pressed(bed, CYLINDER, depth, speed, step)
+    return np.column_stack([curve.displacement, curve.force / END]), bed
+
+
+def pressed(bed: Bed, part: Prism, depth: float, speed: float, step: float) -> Curve:
+    """Press a standing part straight down into the soft bed; return force over depth.
+
+    Args:
+        bed: Bare; it keeps the imprint.
+        part: Rigid and driven.
+        depth: Final depth [m].
+        speed: [m/s].
+        step: Time step [s].
+    """
+    samples = SurfaceSamples.of("punch", part.mesh())
     rows, still = [], np.zeros(3)
     for k in range(round(depth / (speed * step))):
         sunk = speed * step * (k + 1)
         X_JP = (np.eye(3), np.array([0.0, 0.0, bed.bag.cap_height - sunk]))
         force, _ = bed.press(X_JP, (still, np.array([0.0, 0.0, -speed])), samples, step)
         bed.settle(step)
-        rows.append((sunk, force[2] / END))
-    return np.array(rows), bed
+        rows.append((sunk, force[2]))
+    return Curve(*np.array(rows).T)
 
 
 def residual(bed: Bed, depth: float) -> float:

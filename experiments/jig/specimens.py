@@ -57,6 +57,7 @@ class Prism:
         mass: [kg].
         facets: Number of side faces.
         lying: Held with its axis horizontal, along x.
+        friction: Of its surface.
     """
 
     radius: float = 0.0175
@@ -64,6 +65,7 @@ class Prism:
     mass: float = 0.2
     facets: int = 24
     lying: bool = False
+    friction: float = FRICTION
 
     def mesh(self) -> trimesh.Trimesh:
         """Return the surface, its corners outside the round part: the mean radius agrees."""
@@ -83,7 +85,8 @@ class Prism:
         shape = Convex(InMemoryMesh(mesh_file=MemoryFile(text, ".obj", "part")))
         properties = ProximityProperties()
         AddRigidHydroelasticProperties(0.01, properties)
-        AddContactMaterial(friction=CoulombFriction(FRICTION, FRICTION), properties=properties)
+        friction = CoulombFriction(self.friction, self.friction)
+        AddContactMaterial(friction=friction, properties=properties)
         plant.RegisterCollisionGeometry(body, RigidTransform(), shape, "bed_part", properties)
         return body
 
