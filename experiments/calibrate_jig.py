@@ -28,7 +28,7 @@ from experiments.calibration.design import run_designs
 from experiments.calibration.free_numbers import NOT_DECIDED, shown_in
 from experiments.calibration.plot import plot
 from experiments.calibration.posterior import Observation, Posterior, sample_posterior
-from experiments.calibration.record import read_record
+from experiments.calibration.record import read_record, repeats
 from experiments.calibration.summary import configuration, number_table, record_table, result
 from experiments.cli.common import BadUsage, Common
 from experiments.cli.ending import exit_code
@@ -43,7 +43,7 @@ class CalibrationOptions:
     """Options of the script."""
 
     records: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG.csv")]
-    """Records, one test each."""
+    """Records, one test each; several of the same test are repeats."""
 
     samples: int = 32
     """Simulations of each test, a power of 2: about 3 s of CPU each, 0.7 s for the press."""
@@ -72,11 +72,11 @@ def run(options: CalibrationOptions) -> int:
         raise BadUsage(f"--samples must be 16 at least, not {options.samples}.")
     if options.workers < 1:
         raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
-    records = [read_record(path) for path in options.records]
+    tests = repeats([read_record(path) for path in options.records])
     console = Console(quiet=options.common.quiet, highlight=False, width=140)
     with output_folder(options.common.out, "result.json", "calibrated.yaml") as out:
         designs = run_designs(
-            records,
+            [records[0] for records in tests],
             config,
             out,
             samples=options.samples,
@@ -84,10 +84,10 @@ def run(options: CalibrationOptions) -> int:
             workers=options.workers,
             console=console,
         )
-        numbers = shown_in([record.test for record in records])
+        numbers = shown_in([records[0].test for records in tests])
         observations = [
-            Observation.of(record, design, numbers, options.model_error)
-            for record, design in zip(records, designs, strict=True)
+            Observation.of(records, design, numbers, options.model_error)
+            for records, design in zip(tests, designs, strict=True)
         ]
         posterior = sample_posterior(observations, numbers, seed)
         found = result(observations, posterior)

@@ -19,7 +19,7 @@ from experiments.calibration.emulator import Emulator
 from experiments.calibration.free_numbers import FREE, shown_in
 from experiments.calibration.plot import plot
 from experiments.calibration.posterior import Observation, Posterior, sample_posterior
-from experiments.calibration.record import GAUGE_PLAY, Record, noise_of, read_record
+from experiments.calibration.record import GAUGE_PLAY, Record, noise_of, read_record, repeats
 from experiments.calibration.summary import configuration, number_rows, result
 from experiments.campaigns.campaign import run_campaign
 from experiments.jig.curves import Curve
@@ -190,7 +190,7 @@ def test_posterior_of_a_straight_line_is_that_of_least_squares() -> None:
     design = design_of(test)
     truth = np.array([[0.5, 0.4]])
     record = record_of(test, stand_in(test, truth)[0], rng)
-    observed = Observation.of(record, design, design.numbers, model_error=0.05)
+    observed = Observation.of([record], design, design.numbers, model_error=0.05)
     found = sample_posterior([observed], design.numbers, seed=0, steps=1500)
     slopes = np.log(stand_in(test, np.eye(2)) / stand_in(test, np.zeros((1, 2)))).T
     weights = np.linalg.inv(observed.covariance)
@@ -202,11 +202,30 @@ def test_posterior_of_a_straight_line_is_that_of_least_squares() -> None:
     assert found.effective > 500
 
 
+def test_scatter_of_repeats_counts() -> None:
+    """Three that agree leave the twin's 5 %; three that scatter by 22 % add 13 %."""
+    test, rng = TESTS["press"], np.random.default_rng(8)
+    design, forces = design_of(test), stand_in(TESTS["press"], np.full((1, 2), 0.5))[0]
+    same, apart = (
+        Observation.of([record_of(test, k * forces, rng) for k in factors], design, FREE, 0.05)
+        for factors in ((1.0, 1.0, 1.0), (0.8, 1.0, 1.25))
+    )
+    assert np.sqrt(np.diag(same.covariance)) == pytest.approx(0.05, rel=0.02)
+    assert np.sqrt(np.diag(apart.covariance)) == pytest.approx(np.hypot(0.05, 0.129), rel=0.05)
+    assert apart.forces == pytest.approx(forces, rel=0.02)
+
+
+def test_records_of_one_test_are_its_repeats() -> None:
+    rng = np.random.default_rng(9)
+    a, b = (record_of(TESTS[name], np.ones(5), rng) for name in ("push vented", "pull vented"))
+    assert [len(group) for group in repeats([a, b, a])] == [2, 1]
+
+
 def test_same_seed_gives_the_same_draws() -> None:
     test, rng = TESTS["press"], np.random.default_rng(3)
     design = design_of(test)
     record = record_of(test, stand_in(test, np.full((1, 2), 0.5))[0], rng)
-    observed = Observation.of(record, design, design.numbers, 0.05)
+    observed = Observation.of([record], design, design.numbers, 0.05)
     draws = [sample_posterior([observed], design.numbers, seed=4, steps=50) for _ in range(2)]
     assert np.array_equal(draws[0].shares, draws[1].shares)
 
@@ -218,7 +237,7 @@ def test_intervals_of_the_stand_in_hold_its_hidden_numbers() -> None:
     held = widths = 0.0
     for truth in rng.random((20, 1, 2)):
         record = record_of(test, stand_in(test, truth)[0], rng)
-        observed = Observation.of(record, design, design.numbers, model_error=0.0)
+        observed = Observation.of([record], design, design.numbers, model_error=0.0)
         found = sample_posterior([observed], design.numbers, seed=6, steps=200)
         low, high = np.quantile(found.shares, (0.025, 0.975), axis=0)
         held += np.mean((low <= truth[0]) & (truth[0] <= high)) / 20
@@ -231,7 +250,7 @@ def some_posterior() -> tuple[list[Observation], Posterior]:
     test, rng = TESTS["push sealed"], np.random.default_rng(7)
     design = design_of(test)
     record = record_of(test, stand_in(test, np.full((1, 5), 0.5))[0], rng)
-    observed = [Observation.of(record, design, design.numbers, 0.05)]
+    observed = [Observation.of([record], design, design.numbers, 0.05)]
     return observed, sample_posterior(observed, design.numbers, seed=0, steps=300)
 
 
@@ -309,7 +328,7 @@ def test_hidden_numbers_of_the_twin_are_recovered(tmp_path: Path) -> None:
     for k, records in enumerate(jigs):
         numbers = list(FREE)
         pairs = zip(records, designs, strict=True)
-        observed = [Observation.of(record, design, numbers, 0.0) for record, design in pairs]
+        observed = [Observation.of([record], design, numbers, 0.0) for record, design in pairs]
         posterior = sample_posterior(observed, numbers, seed=k, steps=1000)
         low, high = np.quantile(posterior.shares, (0.025, 0.975), axis=0)
         held[k] = (low <= truth[k]) & (truth[k] <= high)

@@ -46,15 +46,13 @@ def _plot_record(axis: Axes, observation: Observation, drawn: Array, flat: Array
             axis.fill_between(
                 [left, right], low[k], high[k], color=colour, alpha=alpha, lw=0, label=label
             )
-    curve = observation.record.curve
-    shown = curve.displacement <= edges[-1, 1] / 1e3
-    axis.plot(curve.displacement[shown] * 1e3, curve.force[shown], "k", lw=0.6, label="record")
-    axis.hlines(observation.forces, *edges.T, colors="C3", lw=1.5, label="its mean forces")
-    test = observation.record.test.name
-    axis.set(
-        xlabel="displacement [mm]", ylabel="force [N]", title=f"{observation.record.name}: {test}"
-    )
-    axis.set_ylim(0, 1.6 * max(curve.force[shown].max(), np.quantile(drawn, 0.975)))
+    for record in observation.records:
+        curve = record.curve.until(edges[-1, 1] / 1e3)
+        axis.plot(curve.displacement * 1e3, curve.force, "k", lw=0.6, label=record.name)
+    axis.hlines(observation.forces, *edges.T, colors="C3", lw=1.5, label="mean forces")
+    name = observation.records[0].test.name
+    axis.set(xlabel="displacement [mm]", ylabel="force [N]", title=name)
+    axis.set_ylim(0, 2 * max(observation.forces.max(), np.quantile(drawn, 0.975)))
     axis.legend(fontsize="x-small")
 
 

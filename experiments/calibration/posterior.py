@@ -1,10 +1,10 @@
 """The posterior over the free numbers, by Markov chain Monte Carlo on the emulators.
 
 Logarithms of mean forces are compared. Their covariance is the sum of the measurement's noise, the
-unknown zero of the gauge, the emulator's own error, and the error of the twin as a model, half of
-whose variance is common to the forces of a record. The sampler is the affine-invariant ensemble of
-Goodman and Weare (Comm. App. Math. Comp. Sci. 5, 2010): nothing to tune, and ridges of numbers that
-the records decide only together cost it nothing.
+unknown zero of the gauge, the scatter of repeats, the emulator's own error, and the error of the
+twin as a model; half of the variance of the last, and of the scatter, is common to all forces. The
+sampler is the affine-invariant ensemble of Goodman and Weare (Comm. App. Math. Comp. Sci. 5, 2010):
+nothing to tune, and ridges of numbers that records decide only together cost it nothing.
 """
 
 from __future__ import annotations
@@ -31,18 +31,18 @@ STRETCH = 2.0  # Of the proposals; that of the paper.
 
 @dataclass(frozen=True)
 class Observation:
-    """A record beside what the twin can do in its test.
+    """The records of a test, with its repeats, beside what the twin can do in it.
 
     Attributes:
-        record: What was measured.
-        emulator: Of the forces that both have.
+        records: What was measured.
+        emulator: Of the forces that all have.
         names: (k,) of these forces.
-        forces: (k,) measured [N].
+        forces: (k,) measured, the geometric mean of the repeats [N].
         columns: Which free numbers the test depends on.
         covariance: (k, k) of the logarithms.
     """
 
-    record: Record
+    records: Sequence[Record]
     emulator: Emulator
     names: list[str]
     forces: Array
@@ -51,33 +51,35 @@ class Observation:
 
     @staticmethod
     def of(
-        record: Record, design: Design, numbers: Sequence[FreeNumber], model_error: float
+        records: Sequence[Record],
+        design: Design,
+        numbers: Sequence[FreeNumber],
+        model_error: float,
     ) -> Observation:
-        """Return a record with an emulator of its test.
+        """Return the records of a test with an emulator of it.
 
         Args:
-            record: What was measured.
+            records: The same test, repeated.
             design: The simulations of its test.
             numbers: All that are free.
             model_error: Standard deviation of the twin's error, relative to the force.
         """
-        found = record.mean_forces
-        names = [name for name in design.names if name in found]
+        each = [record.mean_forces for record in records]
+        names = [name for name in design.names if all(name in found for found in each)]
         columns = [design.names.index(name) for name in names]
         emulator = Emulator.fit(design.shares, design.forces[:, columns])
-        measured = np.array([found[name] for name in names])
-        forces = np.exp(log_force(np.array([force.mean for force in measured])))
-        slopes = np.array([force.slope for force in measured]) * GAUGE_ZERO / forces
-        noise = np.array([force.noise for force in measured]) / forces
-        ones = np.ones((len(names), len(names)))
-        covariance = (
-            emulator.error
-            + np.diag(noise**2)
-            + np.outer(slopes, slopes)
-            + model_error**2 * (ones + np.eye(len(names))) / 2
-        )
+        logs = log_force(np.array([[found[name].mean for name in names] for found in each]))
+        common = (np.ones((len(names), len(names))) + np.eye(len(names))) / 2
+        covariance = emulator.error + model_error**2 * common
+        for found, forces in zip(each, np.exp(logs), strict=True):
+            noise = np.array([found[name].noise for name in names]) / forces
+            zero = np.array([found[name].slope for name in names]) * GAUGE_ZERO / forces
+            covariance += (np.diag(noise**2) + np.outer(zero, zero)) / len(records) ** 2
+        if len(records) > 1:
+            covariance += logs.var(axis=0, ddof=1).mean() / len(records) * common
         where = [numbers.index(number) for number in design.numbers]
-        return Observation(record, emulator, names, forces, where, covariance)
+        forces = np.exp(logs.mean(axis=0))
+        return Observation(records, emulator, names, forces, where, covariance)
 
     def misfit(self, shares: Array) -> Array:
         """Return the squared distance (m,) of the record from predictions, in its covariance."""

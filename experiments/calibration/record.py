@@ -12,7 +12,7 @@ from __future__ import annotations
 
 import csv
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
@@ -134,6 +134,15 @@ def read_record(path: Path) -> Record:
     options: dict[str, str | float] = {"bag": test.bag, **values}
     _check(path.name, test, values, curve)
     return Record(path.name, test, options, vacuum, curve, noise_of(curve))
+
+
+def repeats(records: Sequence[Record]) -> list[list[Record]]:
+    """Return records in groups of the same test, in the order of their first."""
+    groups: dict[str, list[Record]] = {}
+    for record in records:
+        same = repr((record.test.name, sorted(record.options.items()), record.vacuum))
+        groups.setdefault(same, []).append(record)
+    return list(groups.values())
 
 
 def noise_of(curve: Curve) -> float:

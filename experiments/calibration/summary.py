@@ -43,13 +43,14 @@ def number_rows(posterior: Posterior) -> list[dict[str, Any]]:
 
 
 def record_rows(observations: Sequence[Observation], posterior: Posterior) -> list[dict[str, Any]]:
-    """Return what was measured in each record, and how well the twin follows."""
+    """Return what was measured in each test, and how well the twin follows."""
     return [
         {
-            "file": o.record.name,
-            **o.record.options,
-            "vacuum_Pa": o.record.vacuum,
-            "noise_N": o.record.noise,
+            "files": [record.name for record in o.records],
+            "test": o.records[0].test.name,
+            **o.records[0].options,
+            "vacuum_Pa": o.records[0].vacuum,
+            "noise_N": [record.noise for record in o.records],
             "measured": dict(zip(o.names, o.forces.tolist(), strict=True)),
             "emulator_error": dict(zip(o.names, o.emulator.relative_error.tolist(), strict=True)),
             "plausibility": o.plausibility(posterior.shares),
@@ -89,16 +90,16 @@ def number_table(posterior: Posterior) -> Table:
 
 
 def record_table(observations: Sequence[Observation], posterior: Posterior) -> Table:
-    """Return one line per record."""
+    """Return one line per test."""
     table = Table(title="Records", title_justify="left")
-    for name in ("record", "test", "noise [N]", "emulator's error", "plausibility", ""):
-        table.add_column(name, justify="left" if name in ("record", "test", "") else "right")
+    for name in ("test", "records", "noise [N]", "emulator's error", "plausibility", ""):
+        table.add_column(name, justify="left" if name in ("test", "") else "right")
     for o in observations:
         plausible = o.plausibility(posterior.shares)
         table.add_row(
-            o.record.name,
-            o.record.test.name,
-            f"{o.record.noise:.3f}",
+            o.records[0].test.name,
+            str(len(o.records)),
+            f"{max(record.noise for record in o.records):.3f}",
             f"{o.emulator.relative_error.mean():.1%}",
             f"{plausible:.2g}",
             "" if plausible >= IMPLAUSIBLE else "the twin cannot follow",
