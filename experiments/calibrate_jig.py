@@ -45,8 +45,8 @@ class CalibrationOptions:
     records: Annotated[Positional[tuple[Path, ...]], arg(metavar="LOG.csv")]
     """Records, one test each; several of the same test are repeats."""
 
-    samples: int = 32
-    """Simulations of each test, a power of 2: about 3 s of CPU each, 0.7 s for the press."""
+    samples: int = 64
+    """Simulations for each state of the bag, a power of 2: about 2.5 s of CPU each, 0.7 s soft."""
 
     model_error: float = 0.05
     """Standard deviation of the twin's own error, relative to the force."""

@@ -15,7 +15,7 @@ from cell import CellConfig
 from experiments.calibrate_jig import main
 from experiments.calibration.bench import TESTS, BenchTest, force_name, mean_forces, simulate
 from experiments.calibration.design import Design, design_points, run_designs, trials_at
-from experiments.calibration.emulator import Emulator
+from experiments.calibration.emulator import Emulator, error_covariance
 from experiments.calibration.free_numbers import FREE, shown_in
 from experiments.calibration.plot import plot
 from experiments.calibration.posterior import Observation, Posterior, sample_posterior
@@ -184,6 +184,13 @@ def test_emulator_states_its_own_error() -> None:
     assert np.all(actual < 3 * emulator.relative_error + 1e-4)
 
 
+def test_covariance_of_few_errors_is_widened() -> None:
+    """Its inverse is right on average: 2000 times ten errors of four independent forces."""
+    rng = np.random.default_rng(10)
+    inverses = [np.linalg.inv(error_covariance(rng.standard_normal((4, 10)))) for _ in range(2000)]
+    assert np.mean(inverses, axis=0) == pytest.approx(np.eye(4), abs=0.15)
+
+
 def test_posterior_of_a_straight_line_is_that_of_least_squares() -> None:
     """Logarithms that are linear in the numbers: mean and covariance are known."""
     test, rng = TESTS["press"], np.random.default_rng(2)
@@ -322,7 +329,7 @@ def test_hidden_numbers_of_the_twin_are_recovered(tmp_path: Path) -> None:
     jigs, truth = hidden_records(tmp_path), hidden_shares()
     config = CellConfig.load("default", SLOW_CONFIG)
     designs = run_designs(
-        jigs[0], config, tmp_path, samples=32, seed=0, workers=1, console=Console(quiet=True)
+        jigs[0], config, tmp_path, samples=64, seed=0, workers=1, console=Console(quiet=True)
     )
     held, widths = np.zeros((HIDDEN_JIGS, len(FREE))), np.zeros((HIDDEN_JIGS, len(FREE)))
     for k, records in enumerate(jigs):

@@ -21,7 +21,7 @@ Array = NDArray[np.float64]
 LEAST_FORCE = 0.02  # Below which forces are not told apart: their logarithm is taken [N] [A].
 TREND = 10.0  # Variance of the trend's coefficients, in variances of the data: next to flat.
 # Prior of the hyperparameters' logarithms, mean and deviation: kernel variance, nugget, lengths in
-# shares of the prior [A]. It keeps 32 points from being explained by one length of zero.
+# shares of the prior [A]. It keeps few points from being explained by one length of zero.
 PRIOR = {"variance": (0.0, 1.5), "nugget": (-6.0, 2.0), "length": (0.3, 0.8)}
 
 
@@ -92,7 +92,7 @@ class Emulator:
 
     Attributes:
         processes: (k,) one per force.
-        error: (k, k) covariance of the errors of predictions that leave one simulation out.
+        error: (k, k) covariance of its errors, see `error_covariance`.
     """
 
     processes: list[Process]
@@ -104,7 +104,7 @@ class Emulator:
         logs = log_force(forces)
         processes = [Process.fit(shares, column) for column in logs.T]
         left_out = np.array([process.left_out for process in processes])
-        return Emulator(processes, left_out @ left_out.T / left_out.shape[1])
+        return Emulator(processes, error_covariance(left_out))
 
     def predict(self, shares: Array) -> Array:
         """Return the logarithms (m, k) at shares (m, d)."""
@@ -113,7 +113,18 @@ class Emulator:
     @property
     def relative_error(self) -> Array:
         """Root mean square (k,) of the errors that leave one out, relative to the force."""
-        return np.sqrt(np.diag(self.error))
+        return np.sqrt(np.mean([p.left_out**2 for p in self.processes], axis=1))
+
+
+def error_covariance(errors: Array) -> Array:
+    """Return the covariance (k, k) that stands for n errors (k, n) of k forces.
+
+    Larger than that of the errors by n / (n - k - 2): the inverse of a covariance that is estimated
+    from few errors is too large by that, and intervals too narrow (Hartlap et al., Astronomy and
+    Astrophysics 464, 2007).
+    """
+    forces, count = errors.shape
+    return errors @ errors.T / (count - forces - 2)
 
 
 def log_force(force: Array) -> Array:
