@@ -335,7 +335,7 @@ def test_hidden_numbers_of_the_twin_are_recovered(tmp_path: Path) -> None:
     for k, records in enumerate(jigs):
         numbers = list(FREE)
         pairs = zip(records, designs, strict=True)
-        observed = [Observation.of([record], design, numbers, 0.0) for record, design in pairs]
+        observed = [Observation.of([record], design, numbers, 0.05) for record, design in pairs]
         posterior = sample_posterior(observed, numbers, seed=k, steps=1000)
         low, high = np.quantile(posterior.shares, (0.025, 0.975), axis=0)
         held[k] = (low <= truth[k]) & (truth[k] <= high)
@@ -344,4 +344,4 @@ def test_hidden_numbers_of_the_twin_are_recovered(tmp_path: Path) -> None:
     assert np.all(held.sum(axis=0) >= 8)
     widest = dict(zip([number.path for number in FREE], np.median(widths, axis=0), strict=True))
     assert widest["jig.soil.membrane_modulus"] < 0.3
-    assert widest["jig.suction.strength"] < 0.3
+    assert widest["jig.suction.strength"] < 0.6
