@@ -235,6 +235,6 @@ def test_errors_in_the_monitor_keep_their_type(cell: Cell, monkeypatch: pytest.M
     def hole(*_: object) -> None:
         raise BadMesh("The part touches the bed around a hole.")
 
-    monkeypatch.setattr("cell.fixtures.soft_jig.dynamics.imprint_mesh", hole)
+    monkeypatch.setattr("cell.fixtures.soft_jig.frozen.freezing.imprint_mesh", hole)
     with pytest.raises(BadMesh, match=r"^The part touches the bed around a hole\.$"):
         Player(cell, JIG_STORY).play(400)
