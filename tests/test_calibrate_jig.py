@@ -185,10 +185,10 @@ def test_emulator_states_its_own_error() -> None:
 
 
 def test_covariance_of_few_errors_is_widened() -> None:
-    """Its inverse is right on average: 2000 times ten errors of four independent forces."""
+    """Of ten errors of four forces, its inverse is (10 - 4 - 2) / (10 - 4 - 1) on average: safe."""
     rng = np.random.default_rng(10)
     inverses = [np.linalg.inv(error_covariance(rng.standard_normal((4, 10)))) for _ in range(2000)]
-    assert np.mean(inverses, axis=0) == pytest.approx(np.eye(4), abs=0.15)
+    assert np.mean(inverses, axis=0) == pytest.approx(0.8 * np.eye(4), abs=0.1)
 
 
 def test_posterior_of_a_straight_line_is_that_of_least_squares() -> None:

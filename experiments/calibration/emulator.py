@@ -121,7 +121,7 @@ def error_covariance(errors: Array) -> Array:
 
     Larger than that of the errors by n / (n - k - 2): the inverse of a covariance that is estimated
     from few errors is too large by that, and intervals too narrow (Hartlap et al., Astronomy and
-    Astrophysics 464, 2007).
+    Astrophysics 464, 2007). That is for a mean that is estimated; here it is zero, which is safe.
     """
     forces, count = errors.shape
     return errors @ errors.T / (count - forces - 2)
