@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from cell.fixtures.contacts import Contacts
 from cell.vectors import cross
@@ -169,9 +170,11 @@ def holding_map(
     """
     always = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -weight])
     always = always if steady is None else always + steady
-    body = _Body(contacts, p_JG)
-    rest = body.rest(always)
-    return _ramp(body, rest, always, np.asarray(directions, dtype=float), most)
+    # Matrices are small: with threads of its own BLAS takes fifty times as long [M].
+    with threadpool_limits(1, user_api="blas"):
+        body = _Body(contacts, p_JG)
+        rest = body.rest(always)
+        return _ramp(body, rest, always, np.asarray(directions, dtype=float), most)
 
 
 def _ramp(
