@@ -25,6 +25,7 @@ from pydrake.systems.framework import Context, Diagram, DiagramBuilder
 
 from cell.builder import plant_config
 from cell.configuration.config import CellConfig
+from cell.contact.links import ContactLinks
 from cell.fixtures import add_fixture
 from cell.fixtures.wiring import wire_fixture
 from cell.link_policy import add_links
@@ -98,6 +99,7 @@ class Rig(Stage):
         hand_length: From the carriage to T [m].
         palm: What lowers the palm for the push; None if it is low already.
         sleeper: Locks part and base while they are at rest.
+        links: Of contacts that stick.
         monitor: Of the diagram.
     """
 
@@ -107,6 +109,7 @@ class Rig(Stage):
     hand_length: float
     palm: LowPalm | None
     sleeper: Sleep
+    links: ContactLinks
     monitor: Monitor
 
     def joints(self, pose: HandPose) -> np.ndarray:
@@ -199,6 +202,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
         wrist=WrenchSensor(plant, wrist),
         force_plate=WrenchSensor(plant, workcell.plate_weld),
         sleeper=sleeper,
+        links=links,
         monitor=Monitor(counter, reset, (fixture, links)),
     )
 

@@ -143,7 +143,9 @@ class RigSimulation:
         self.rig.jig_base.sleep(self.root)
 
     def wake(self) -> None:
-        """Release part and jig."""
+        """Release part and jig; from now on the contact that is put to the test is full."""
+        tested = frozenset([self.rig.part.part.name, self.rig.fixture.name])
+        self.rig.links.intend(self.root, mating=frozenset([tested]))
         self.rig.jig_base.wake(self.root)
         self.rig.sleeper.wake(self.root, self.rig.part.body)
 

@@ -127,6 +127,8 @@ def push(station: Station, part: str, line: PushLine) -> Iterator[Phase]:
         5.0,
         commands={arm.name: motion},
         awake=frozenset([part]),
+        # What a push puts to the test is not linked.
+        mating=frozenset([frozenset([part, station.cell.fixture.name])]),
         tare=False,
     )
 
