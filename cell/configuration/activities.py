@@ -201,7 +201,7 @@ class SensorConfig:
     """How it is sensed where parts are."""
 
     source: str = setting(
-        TRUTH, "", "truth (with the noise below), camera (depth images of that on the hand), "
+        TRUTH, "", "With what: truth (and the noise below), camera (depth images from the hand), "
         "or blind (nothing is sensed: the tray is where the layout has it).",
         "[A] The truth by default.",
     )  # fmt: skip
