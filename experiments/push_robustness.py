@@ -1,4 +1,4 @@
-"""Robustness of the push outcomes, to thirteen free parameters and to the numerics.
+"""Robustness of the push outcomes, to the free parameters and to the numerics.
 
     python -m experiments.push_robustness --samples 20 --workers 2 --out out/robustness
     python -m experiments.push_robustness --samples 0 --one-by-one

@@ -144,6 +144,21 @@ def palm_touches(rig, root) -> set[str]:
     return found
 
 
+def test_contact_that_a_push_tests_is_not_linked(motor_rig) -> None:
+    """A link would carry the impact of the hand, and let go."""
+    X_WJ, posture = motor_rig.config.workcell.X_WJ, PUSHES["motor/P2/a"].posture
+    X_WP = planned_pose(motor_rig.part.part, posture, X_WJ, 0.1)
+    pose = tip_pose(motor_rig, X_WP, posture.grasp)
+    simulation, links = RigSimulation(motor_rig, X_WJ, X_WP, pose), motor_rig.links
+    simulation.fix()
+    bodies = (motor_rig.fixture.base, motor_rig.part.body)
+    pair = tuple(sorted(int(body.index()) for body in bodies))
+    root, before = simulation.root, links.memory(simulation.root).intent
+    assert links.policy.until(root, pair, before) is not None
+    simulation.wake()
+    assert links.policy.until(root, pair, links.memory(root).intent) is None
+
+
 def test_push_starts_at_the_height_of_the_rule(motor_rig) -> None:
     config, push = motor_rig.config, PUSHES["motor/P2/a"]
     part, X_WJ = motor_rig.part.part, config.workcell.X_WJ

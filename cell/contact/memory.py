@@ -20,7 +20,8 @@ class Intent:
     """What a phase means to happen between bodies.
 
     Attributes:
-        mating: Names of the two parts of each pair that is being mated: their contact stays full.
+        mating: Names of each pair that is being mated, or whose hold is tested: their contact stays
+            full.
         riding: Names of loose bolts that nothing but the part in which they lie touches.
     """
 

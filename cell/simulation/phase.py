@@ -216,8 +216,8 @@ class Phase:
         start: Events at the start of the phase.
         every_step: Event after every step.
         awake: Names of the parts that are awake during the phase.
-        mating: Names of the two parts of each pair that is being mated: their contact is computed
-            in full.
+        mating: Names of each pair that is being mated, or whose hold is tested, parts or a part and
+            the fixture: their contact is computed in full.
         riding: Names of bolts that lie loose in a part that is carried or set down and touch
             nothing else: while they stick to it, they may be linked.
         fine_log: Log every step.
