@@ -17,7 +17,7 @@ from experiments.campaigns.store import write_index, write_trial
 from experiments.campaigns.trial import Row
 from experiments.cli.main import main
 from experiments.compare.comparison import Mean, compared
-from experiments.compare.tolerances import BY_UNIT, EXACT, NAMED, tolerance_of
+from experiments.compare.tolerances import BY_UNIT, EXACT, NAMED, Tolerance, tolerance_of
 from planning.assembly_plan.plan_file import save_plan
 from planning.assembly_plan.planner import plan
 
@@ -105,6 +105,13 @@ def test_number_may_drift_up_to_its_tolerance_and_no_further() -> None:
         outside = {"step": {"depth_m": 0.010 + sign * 1.001 * allowed}}
         assert compared(before, inside)[0].ok
         assert not compared(before, outside)[0].ok
+
+
+def test_larger_of_two_tolerances_applies() -> None:
+    """5 N in 100 by the relative one, 1 N in 0 by the absolute one."""
+    force = Tolerance("force_N", 1.0, 0.05, "")
+    assert force.allowed(-100.0) == 5.0
+    assert force.allowed(0.0) == 1.0
 
 
 def test_what_only_one_has_differs_whichever_it_is() -> None:

@@ -140,6 +140,18 @@ def test_look_at_the_tray_tells_where_everything_in_it_is(fresh: RunningCell) ->
 
 
 @needs_rendering
+def test_tray_does_not_slide_along_itself(fresh: RunningCell) -> None:
+    """Its places are known to 0.2 mm, whatever the noise of the images."""
+    source, state = fresh.station.source, fresh.save()
+    assert isinstance(source, HandEye)
+    for seed in (3, 4, 5):
+        source.rng = np.random.default_rng(seed)
+        carried_out(fresh, look(fresh.station, Kind.LOOK, "motor", closely=("motor",)))
+        assert errors(fresh, "bolt_1")[0] < 2e-4, seed
+        fresh.resume(state)
+
+
+@needs_rendering
 def test_what_nobody_goes_to_see_is_not_seen(fresh: RunningCell) -> None:
     station = fresh.station
     before = station.pose_of("motor")

@@ -2,8 +2,8 @@
 
 The hand carries it round what is to be seen; from the depth images of all sides together every part
 is registered against its mesh, from where it is believed to be. Parts that nothing has been seen of
-yet are taken to be in the tray: the tray is registered first, as one large part, and every part is
-expected in its place there. For parts that are too small for the camera, such as bolts, that is all
+yet are taken to be in the tray: the tray with its parts is registered first, as one, and every part
+is expected in its place there. For parts that are too small for the camera, such as bolts, that is all
 that is known: a place in a rack whose pose has been seen.
 """
 
@@ -151,7 +151,13 @@ class HandEye:
     def _tray_surface(self) -> Surface:
         if self._tray_model is None:
             assert self.product.tray is not None
-            self._tray_model = Surface.of_model(self.product.tray)
+            # With its parts: a tray is flat, and slides by millimetres along itself without them.
+            parts = [
+                part.mesh.copy().apply_transform(part.X_TrayP.GetAsMatrix4())
+                for part in self.product.parts.values()
+                if part.X_TrayP is not None
+            ]
+            self._tray_model = Surface.of_model(self.product.tray, parts)
         return self._tray_model
 
     def save(self) -> np.ndarray:

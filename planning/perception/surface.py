@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -46,17 +47,18 @@ class Surface:
         return Surface(np.array(points), np.array(mesh.face_normals[faces]), lower, upper)
 
     @staticmethod
-    def of_model(model: str) -> Surface:
+    def of_model(model: str, others: Iterable[trimesh.Trimesh] = ()) -> Surface:
         """Return the surface of what is visible of an SDF model with one body, in its frame.
 
         Args:
             model: Name or URL, as `cell.paths.model_url` takes it.
+            others: Meshes in the same frame that stand in or on it [m].
         """
         builder = DiagramBuilder()
         plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
         (instance,) = new_parser(plant, model).AddModelsFromUrl(model_url(model))
         body = plant.get_body(plant.GetBodyIndices(instance)[0])
-        inspector, meshes = scene_graph.model_inspector(), []
+        inspector, meshes = scene_graph.model_inspector(), list(others)
         for geometry in plant.GetVisualGeometriesForBody(body):
             mesh = shape_mesh(inspector.GetShape(geometry))
             mesh.apply_transform(inspector.GetPoseInFrame(geometry).GetAsMatrix4())
