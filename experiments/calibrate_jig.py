@@ -30,7 +30,7 @@ from experiments.calibration.plot import plot
 from experiments.calibration.posterior import Observation, Posterior, sample_posterior
 from experiments.calibration.record import read_record, repeats
 from experiments.calibration.summary import configuration, number_table, record_table, result
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder, write_arrays, write_json, write_text
 from experiments.reporting.provenance import finite, versions
@@ -68,10 +68,8 @@ def run(options: CalibrationOptions) -> int:
         raise BadUsage("It needs at least one record, LOG.csv.")
     if not 0 <= options.model_error < MOST_ERROR:
         raise BadUsage(f"--model-error must be from 0 to below 1, not {options.model_error:g}.")
-    if options.samples < 16:
-        raise BadUsage(f"--samples must be 16 at least, not {options.samples}.")
-    if options.workers < 1:
-        raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
+    check_counts(options, "samples", least=16)
+    check_counts(options, "workers")
     tests = repeats([read_record(path) for path in options.records])
     console = Console(quiet=options.common.quiet, highlight=False, width=140)
     with output_folder(options.common.out, "result.json", "calibrated.yaml") as out:

@@ -25,7 +25,7 @@ from cell.configuration.config import CellConfig
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Row, Trial
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.paper.cases import cases_of
 from experiments.reporting.output import output_folder, write_json
@@ -184,9 +184,7 @@ def run(options: StudyOptions) -> int:
     Raises:
         InputError: An option or a value is invalid.
     """
-    for name in ("seeds", "workers"):
-        if getattr(options, name) < 1:
-            raise BadUsage(f"--{name} must be >= 1, not {getattr(options, name)}.")
+    check_counts(options, "seeds", "workers")
     config = options.common.load_config()
     # Bad values are refused before hours of computation.
     wanted = {run: run.trial(config) for run in study_runs(options.seeds)}

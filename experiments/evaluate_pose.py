@@ -31,7 +31,7 @@ from cell.machines.cameras.camera import ABOVE, Picture, cameras_of
 from cell.machines.cameras.rendering import NoRendering, rendering_problem
 from cell.products.loading import load_product
 from cell.whole_file import whole_file
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.paper.cases import case_seed, cases_of
 from experiments.paper.rig.stage import Observer
@@ -97,9 +97,7 @@ def run(options: Options) -> int:
         NoRendering: This machine cannot render.
     """
     config, cases = options.common.load_config(), cases_of("place", options.case)
-    for name in ("trials", "looks", "views"):
-        if getattr(options, name) < 1:
-            raise BadUsage(f"--{name} must be at least 1, not {getattr(options, name)}.")
+    check_counts(options, "trials", "looks", "views")
     if reason := rendering_problem():
         raise NoRendering(f"pose estimation needs pictures: {reason}")
     product, rows = load_product("motor_unit"), {}

@@ -33,7 +33,7 @@ from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import parse_sample, trials
 from experiments.campaigns.summary import rate_of
 from experiments.campaigns.trial import Row
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.paper.cases import case_named
 from experiments.reporting.html_page import Picture, figures, page, pairs, section, table
@@ -91,8 +91,7 @@ def run(options: DesignOptions) -> int:
     Raises:
         InputError: An option is invalid.
     """
-    if options.workers < 1:
-        raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
+    check_counts(options, "workers")
     case_named("push", options.case)
     config, seed = options.common.load_config(), options.common.seed
     ranges = RANGES | parse_sample(options.sample)

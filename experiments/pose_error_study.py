@@ -36,7 +36,7 @@ from cell.products.loading import require_product_file
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import parse_grid, trials
 from experiments.campaigns.trial import Row, Task, Trial
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.reporting.html_page import figures, page, pairs, section, table
 from experiments.reporting.output import output_folder, write_json, write_text
@@ -127,9 +127,7 @@ def run(options: ErrorOptions) -> int:
         InputError: An option is invalid.
         RunFailure: The assembly fails without errors.
     """
-    for name in ("seeds", "workers"):
-        if getattr(options, name) < 1:
-            raise BadUsage(f"--{name} must be at least 1, not {getattr(options, name)}.")
+    check_counts(options, "seeds", "workers")
     require_product_file(options.product)
     levels, expected = levels_of(options.level), EXPECTED | expected_of(options.expected)
     config, seed = options.common.load_config(), options.common.seed

@@ -33,7 +33,7 @@ from cell.products.read_options import ReadOptions
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Row
-from experiments.cli.common import BadUsage, Common, split_order
+from experiments.cli.common import BadUsage, Common, check_counts, split_order
 from experiments.cli.ending import exit_code
 from experiments.compare.comparison import (
     Comparison,
@@ -98,8 +98,7 @@ def run(options: VariantOptions) -> int:
     Raises:
         InputError: An option, a product or the table is invalid.
     """
-    if options.workers < 1:
-        raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
+    check_counts(options, "workers")
     if options.table is None and not options.variants:
         raise BadUsage("Name a VARIANT, or a --table of them.")
     check_files(junit=options.junit, csv=options.csv)

@@ -36,7 +36,7 @@ from cell.errors import RunFailure
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Row
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.paper.case_plots import PAPER_MEANS
 from experiments.paper.cases import cases_of
@@ -299,12 +299,10 @@ def run(options: RobustnessOptions) -> int:
         InputError: An option or a value is invalid.
     """
     config = options.common.load_config()
-    if options.samples < 0:
-        raise BadUsage(f"--samples must be at least 0, not {options.samples}.")
+    check_counts(options, "samples", least=0)
     if not 0 < options.spread < 1:
         raise BadUsage(f"--spread must be between 0 and 1, not {options.spread:g}.")
-    if options.workers < 1:
-        raise BadUsage(f"--workers must be at least 1, not {options.workers}.")
+    check_counts(options, "workers")
     cases_of("push", options.case)
     console = Console(quiet=options.common.quiet, highlight=False)
     infos = {entry.path: entry.info for entry in entries(config)}

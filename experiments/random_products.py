@@ -29,7 +29,7 @@ from cell.errors import CellError
 from cell.products.loading import load_product
 from experiments.assembly.assemble import run_job
 from experiments.assembly.job import Job
-from experiments.cli.common import Common
+from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.product.check import find
 from experiments.product.init import PRODUCT_FILE, Wanted, run_init
@@ -81,6 +81,7 @@ class RandomProducts:
 
     def run(self) -> int:
         """Write the table; return 0 if seven of ten are assembled, else 1."""
+        check_counts(self, "count")
         config, trials = self.common.load_config(), []
         console = Console(quiet=self.common.quiet, highlight=False)
         with output_folder(self.common.out, TABLE) as out:

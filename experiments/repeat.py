@@ -24,7 +24,7 @@ from experiments.campaigns.command import run_sweep
 from experiments.campaigns.points import trials
 from experiments.campaigns.store import read_trial, trial_file
 from experiments.campaigns.trial import Row
-from experiments.cli.common import BadUsage, Common, split_order
+from experiments.cli.common import Common, check_counts, split_order
 from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder
 from planning.assembly_plan.planner import plan
@@ -69,9 +69,7 @@ def run_all(options: RepeatOptions) -> int:
     Raises:
         InputError: An option is invalid.
     """
-    for name in ("seeds", "workers"):
-        if getattr(options, name) < 1:
-            raise BadUsage(f"--{name} must be >= 1, not {getattr(options, name)}.")
+    check_counts(options, "seeds", "workers")
     common = options.common
     config = common.load_config(options.fixture)
     require_product_file(options.product)

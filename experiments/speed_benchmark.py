@@ -38,7 +38,7 @@ from cell.errors import InputError
 from cell.products.loading import load_product
 from cell.products.product import Product
 from experiments.assembly.prepare import RunningCell
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder, whole_file, write_json
 from experiments.reporting.provenance import finite, versions
@@ -108,8 +108,7 @@ def run(options: SpeedOptions) -> int:
     """
     if not options.window > 0.0:
         raise BadUsage(f"--window must be above 0, not {options.window:g}.")
-    if options.repeats < 1:
-        raise BadUsage(f"--repeats must be at least 1, not {options.repeats}.")
+    check_counts(options, "repeats")
     product = load_product(options.product)
     product.check_simulable()
     todo = planned_steps(product, options)

@@ -320,7 +320,7 @@ def paths() -> Iterator[Case]:
         yield Case(
             f"--seed {text[:9]!r}", ("plan", "p.yaml", *PLAN, "--seed", text), files, ("seed",)
         )
-    for text in ("nan", "inf", "-1", "1e308", "x", ""):
+    for text in ("nan", "inf", "-1", "1e308", "1e-320", "x", ""):
         arguments = ("plan", "p.yaml", *PLAN, "--tolerance-mm", text)
         yield Case(f"--tolerance-mm {text!r}", arguments, files, ("tolerance-mm",))
     for command, option in (
@@ -331,7 +331,7 @@ def paths() -> Iterator[Case]:
         ("sweep", "--grid"),
         ("sweep", "--sample"),
     ):
-        for text in ("", "x", "motor/P9", "[/red]", "\x1b[31m", "x" * 3000, "0", "-1", "nan"):
+        for text in ("", "x", "[/red]", "\x1b[31m", "x" * 3000, "0", "-1", "nan", "9" * 30):
             experiment = ("assemble",) if command == "sweep" else ()
             arguments = (command, *experiment, "--out", "out", f"{option}={text}")
             yield Case(f"{command} {option} {text[:9]!r}", arguments, {}, ("",))

@@ -223,7 +223,7 @@ def test_up_is_an_option_where_no_file_states_it(tmp_path: Path, up, fixed, caps
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--up", "z"], 2, "No up axis 'z'"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--order", "low,low"], 2, "repeats low"),
         ({"low": LOW, "high": HIGH}, ["--units", "mm", "--density", "x"], 2, "--density x: write"),
-        ({"low": LOW, "high": HIGH}, ["--units", "mm", "--tolerance-mm", "0"], 2, "between 0"),
+        ({"low": LOW, "high": HIGH}, ["--units", "mm", "--tolerance-mm", "0"], 2, "from 1e-6"),
     ],
 )
 def test_bad_input_is_one_line_and_an_answer_has_its_warning(

@@ -140,8 +140,10 @@ def test_grids_and_samples_are_read_from_text() -> None:
         (["push", "--sample", "push.speed=0.3:0.1"], "the first end must be smaller"),
         (["push", "--sample", "push.speed=0.1:0.3", "--samples", "100"], "64 or 128"),
         (["push", "--grid", "push.speed=0.2", "--sample", "push.speed=0.1:0.3"], "both in a grid"),
-        (["push", "--seeds", "0"], "--seeds must be at least 1"),
-        (["push", "--workers", "0"], "--workers must be at least 1"),
+        (["push", "--seeds", "0"], "--seeds must be from 1 to"),
+        (["push", "--seeds", "9" * 30], "--seeds must be from 1 to"),
+        (["push", "--samples", "0"], "--samples must be from 1 to"),
+        (["push", "--workers", "0"], "--workers must be from 1 to"),
         (["push", "--product", "qqq"], "qqq"),
     ],
 )

@@ -96,7 +96,7 @@ def test_study_is_made_from_finished_trials(tmp_path: Path) -> None:
 
 def test_bad_options_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["--seeds", "0", "--out", str(tmp_path)]) == 2
-    assert "--seeds must be >= 1" in capsys.readouterr().err
+    assert "--seeds must be from 1 to" in capsys.readouterr().err
     assert (
         StudyRun("push", "motor/P1/a", HALF, 0).trial(CellConfig()).options["case"] == "motor/P1/a"
     )

@@ -328,7 +328,7 @@ def test_script_makes_states_once_and_compares_with_the_run_before(
     ("options", "culprit"),
     [
         (["--window", "0"], "--window must be above 0"),
-        (["--repeats", "0"], "--repeats must be at least 1"),
+        (["--repeats", "0"], "--repeats must be from 1 to"),
         (["nosuch"], "nosuch"),
         (["--set", "simulation.time_stop=1"], "simulation.time_stop"),
     ],

@@ -18,6 +18,7 @@ Point = Mapping[str, Any]
 """Value by name: a path in the configuration, or an option of the experiment."""
 
 DESIGNS = ("sobol", "lhs")
+MOST = 1_000_000  # [A] Trials of a campaign: their list still fits into memory.
 
 
 def grid(axes: Mapping[str, Sequence[Any]]) -> list[Point]:
@@ -46,13 +47,10 @@ def sample(
     for name, (low, high) in ranges.items():
         if not low < high:
             raise InputError(f"--sample {name}={low:g}:{high:g}: the first end must be smaller.")
-    if number < 1 or (design == "sobol" and number & (number - 1)):
+    if design == "sobol" and number & (number - 1):
         raise InputError(
             f"--samples {number}: Sobol's points are balanced for powers of 2 only; take "
-            f"{1 << max(number.bit_length() - 1, 0)} or {1 << max(number, 1).bit_length()}, "
-            "or --design lhs."
-            if number > 0
-            else f"--samples must be at least 1, not {number}."
+            f"{1 << (number.bit_length() - 1)} or {1 << number.bit_length()}, or --design lhs."
         )
     from scipy.stats import qmc  # Half a second that workers can do without.
 
@@ -125,6 +123,8 @@ def trials(
     Raises:
         InputError: A name is unknown, or a value impossible. Nothing has run yet.
     """
+    if len(points) * len(seeds) > MOST:
+        raise InputError(f"{len(points)} points with {len(seeds)} seeds: {MOST} trials at most.")
     found = experiment_named(experiment if isinstance(experiment, str) else name_of(experiment))
     code = code_digest(found.script)
     config = config or CellConfig.load()

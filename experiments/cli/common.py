@@ -20,6 +20,27 @@ class BadUsage(InputError):
     """A command line that cannot be understood."""
 
 
+MOST = 100_000  # [A] Of anything that is counted: its list still fits into memory.
+
+
+def check_counts(options: object, *names: str, least: int = 1) -> None:
+    """Refuse numbers of trials, processes or the like that cannot be meant.
+
+    Args:
+        options: Has them as attributes.
+        names: Of the attributes, written with a hyphen on the command line.
+        least: What each has to be at least.
+
+    Raises:
+        BadUsage: One is out of range.
+    """
+    for name in names:
+        count = getattr(options, name)
+        if not least <= count <= MOST:
+            option = name.replace("_", "-")
+            raise BadUsage(f"--{option} must be from {least} to {MOST}, not {count}.")
+
+
 @dataclass(frozen=True)
 class Common:
     """Options that every command takes."""

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, arg
 
-from experiments.cli.common import Common
+from experiments.cli.common import Common, check_counts
 from experiments.reporting.output import output_folder
 
 
@@ -73,11 +73,11 @@ def _run_experiment(command: str, options: Place | Push) -> int:
     """Check everything that was asked for, then run it."""
     from experiments.paper.case_results import Experiment
     from experiments.paper.cases import cases_of
-    from experiments.paper.place_push import check_numbers, run_experiment, with_pressure
+    from experiments.paper.place_push import run_experiment, with_pressure
 
     common = options.common
     config = with_pressure(common.load_config(options.fixture), options.pressure)
-    check_numbers(trials=options.trials, workers=options.workers)
+    check_counts(options, "trials", "workers")
     cases_of(command, options.case)
     with output_folder(common.out) as out:
         experiment = Experiment(

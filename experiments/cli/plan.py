@@ -108,8 +108,8 @@ class Plan:
         from experiments.plan.options import PlanOptions
         from planning.feasibility.cache import user_cache
 
-        if self.tolerance_mm is not None and not 0.0 < self.tolerance_mm < 10.0:
-            raise BadUsage(f"--tolerance-mm must be between 0 and 10, not {self.tolerance_mm:g}.")
+        if self.tolerance_mm is not None and not 1e-6 <= self.tolerance_mm < 10.0:
+            raise BadUsage(f"--tolerance-mm must be from 1e-6 to 10, not {self.tolerance_mm:g}.")
         tolerance = None if self.tolerance_mm is None else 1e-3 * self.tolerance_mm
         return PlanOptions(
             read=ReadOptions(

@@ -8,7 +8,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, UseAppendAction, arg
 
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, check_counts
 from experiments.reporting.output import output_folder
 
 
@@ -47,10 +47,9 @@ class Regress:
         config = self.common.load_config()
         if self.common.seed != 0:
             raise BadUsage("The stored metrics are those of --seed 0: leave it out.")
-        from experiments.paper.place_push import check_numbers
         from experiments.regress.command import Regression
 
-        check_numbers(workers=self.workers)
+        check_counts(self, "workers")
         regression = Regression.of(
             self.suite,
             self.case,

@@ -7,7 +7,7 @@ from typing import Annotated, Literal
 
 from tyro.conf import OmitArgPrefixes, Positional, UseAppendAction, arg
 
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import Common, check_counts
 from experiments.reporting.output import output_folder
 
 
@@ -52,9 +52,7 @@ class Sweep:
 
     def run(self) -> int:
         """Write the files of the trials, index, summary and report; return the exit code."""
-        for name in ("seeds", "workers"):
-            if getattr(self, name) < 1:
-                raise BadUsage(f"--{name} must be at least 1, not {getattr(self, name)}.")
+        check_counts(self, "seeds", "samples", "workers")
         config = self.common.load_config()
         from experiments.campaigns.command import run_sweep
         from experiments.campaigns.points import (

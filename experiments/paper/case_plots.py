@@ -31,7 +31,8 @@ def plot_forces(result: CaseResult) -> bytes:
         if begun is not None:
             axes.axvline(begun, color="0.8", linewidth=0.8, zorder=0)
     _style(axes, "time [s]", "force [N]")
-    axes.legend(fontsize=8, frameon=False)
+    if axes.lines:  # No trial has a log if all were killed.
+        axes.legend(fontsize=8, frameon=False)
     return figure_png(figure)
 
 

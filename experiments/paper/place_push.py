@@ -10,7 +10,6 @@ from pydrake.math import RigidTransform
 from rich.console import Console
 
 from cell.configuration.config import CellConfig
-from cell.errors import InputError
 from cell.machines.cameras.rendering import rendering_problem
 from cell.products.loading import load_product
 from experiments.campaigns.campaign import run_campaign
@@ -40,13 +39,6 @@ def with_pressure(config: CellConfig, pressure_kpa: float | None) -> CellConfig:
     if pressure_kpa is None:
         return config
     return config.with_changes({"jig.vacuum.pressure": 1e3 * pressure_kpa})
-
-
-def check_numbers(**numbers: int) -> None:
-    """Raise `InputError` unless every number, of an option by this name, is positive."""
-    for name, number in numbers.items():
-        if number < 1:
-            raise InputError(f"--{name} must be at least 1, not {number}.")
 
 
 def run_experiment(experiment: Experiment, label: str | None) -> int:

@@ -3,8 +3,8 @@
 The hand carries it round what is to be seen; from the depth images of all sides together every part
 is registered against its mesh, from where it is believed to be. Parts that nothing has been seen of
 yet are taken to be in the tray: the tray with its parts is registered first, as one, and every part
-is expected in its place there. For parts that are too small for the camera, such as bolts, that is all
-that is known: a place in a rack whose pose has been seen.
+is expected in its place there. For parts that are too small for the camera, such as bolts, that is
+all that is known: a place in a rack whose pose has been seen.
 """
 
 from __future__ import annotations
