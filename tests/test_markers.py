@@ -1,5 +1,6 @@
 """The board of markers: what it looks like, finding it in images, and what follows from that."""
 
+from collections.abc import Iterable
 from itertools import product
 
 import numpy as np
@@ -28,7 +29,9 @@ needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="
 VIEWS = [(20.0, 85.0, 0.40), (100.0, 60.0, 0.42, 30.0), (230.0, 45.0, 0.45, -80.0)]
 
 
-def corners_at(X_CD: RigidTransform, markers=range(12), noise=0.0, rng=None):
+def corners_at(
+    X_CD: RigidTransform, markers: Iterable[int] = range(12), noise: float = 0.0, rng=None
+) -> dict[int, np.ndarray]:
     """Return exact corners of markers, with noise [pixels]."""
     rng = rng or np.random.default_rng(0)
     exact = {k: PINHOLE.project((X_CD @ board.marker_corners()[k].T).T) for k in markers}
