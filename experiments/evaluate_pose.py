@@ -40,7 +40,7 @@ from experiments.paper.trial import TrialDisturbance, run_trial
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.provenance import versions
 from experiments.vision.boxes import ESTIMATE, TRUTH, with_boxes
-from experiments.vision.pose_error import ADD_SHARE, PoseError, pose_error
+from experiments.vision.pose_error import ADD_SHARE, PoseError, pose_error, random_error
 from planning.perception.registration import Registration, register, views_of
 from planning.perception.surface import Surface
 from planning.perception.viewpoints import viewpoints
@@ -145,7 +145,7 @@ class _Eye:
                 for X_WC in viewpoints(X_WTrue @ surface.centre, options.views, rng)
             ]
             believed = [_misplaced(picture, options, rng) for picture in pictures]
-            X_WStart = X_WTrue @ _error(options.start, options.start_deg, rng)
+            X_WStart = X_WTrue @ random_error(options.start, options.start_deg, rng)
             started = time.process_time()
             views = views_of(believed, surface, X_WStart, rng)
             estimate = register(surface, views, X_WStart)
@@ -167,13 +167,6 @@ def _judged(
     return pose_error(
         surface, estimate.X_WP, X_WTrue, estimate.covariance, picture.pinhole, picture.X_WC
     )
-
-
-def _error(offset: float, angle_deg: float, rng: np.random.Generator) -> RigidTransform:
-    """Return an error of a stated size [m, deg] in a random direction, about a random axis."""
-    way, axis = (vector / np.linalg.norm(vector) for vector in rng.normal(size=(2, 3)))
-    turn = Rotation.from_rotvec(np.deg2rad(angle_deg) * axis).as_matrix()
-    return RigidTransform(RotationMatrix(turn), offset * way)
 
 
 def _misplaced(picture: Picture, options: Options, rng: np.random.Generator) -> Picture:

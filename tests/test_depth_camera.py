@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from pydrake.geometry import Box, ColorRenderCamera, DepthRange, DepthRenderCamera, Sphere
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
 from pydrake.systems.framework import DiagramBuilder
 
@@ -11,7 +11,13 @@ from cell import CellConfig, build_cell, load_product
 from cell.configuration.machines import CameraConfig
 from cell.machines.cameras.camera import ABOVE, HAND_EYE, Camera, cameras_of
 from cell.machines.cameras.pinhole import HALF_PIXEL, Pinhole
-from cell.machines.cameras.rendering import camera_core, rendering, rendering_problem  # noqa: F401
+from cell.machines.cameras.rendering import (  # noqa: F401
+    Lamp,
+    Lighting,
+    camera_core,
+    rendering,
+    rendering_problem,
+)
 from cell.machines.cameras.stereo_depth import StereoDepth
 
 needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
@@ -26,6 +32,42 @@ def test_projection_and_points_are_inverse() -> None:
     row, column = np.nonzero(depth)
     pixels = pinhole.project(pinhole.points(depth))
     np.testing.assert_allclose(pixels, np.column_stack([column, row]), atol=1e-9)
+
+
+def test_finer_pixels_are_parts_of_the_coarse_ones() -> None:
+    """The middle of a pixel is that of the pixels that it is divided into."""
+    pinhole, p_CQ = Pinhole(64, 48, 50.0, 30.2, 25.7), np.array([[0.1, -0.2, 0.7]])
+    fine = pinhole.finer(3)
+    assert (fine.width, fine.height) == (192, 144)
+    coarse = pinhole.project(p_CQ)
+    # Three fine pixels, 3 u - 1 to 3 u + 1 of those counted here, make the coarse pixel u.
+    np.testing.assert_allclose(fine.project(p_CQ), 3.0 * coarse + 1.0)
+
+
+@needs_rendering
+def test_colour_depends_on_lighting_and_is_smooth_at_edges_when_sampled() -> None:
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 0.0)
+    tilted = RigidTransform(RotationMatrix.MakeZRotation(0.1), np.zeros(3))
+    plant.RegisterVisualGeometry(
+        plant.world_body(), tilted, Box(0.2, 0.2, 0.02), "plate", [1, 1, 1, 1]
+    )
+    plant.Finalize()
+    diagram = builder.Build()
+    root = diagram.CreateDefaultContext()
+    camera = cameras_of(plant, scene_graph, RigidTransform(), CameraConfig())[ABOVE]
+    X_WC, lamp, black = camera.X_WC(root), (0.0, 0.0, -1.0), (0.0, 0.0, 0.0)
+    levels = {}
+    for intensity in (0.4, 0.8):
+        lighting = Lighting((Lamp("world", lamp, intensity),), black)
+        with rendering(scene_graph, root, shadows=False, lighting=lighting) as query:
+            levels[intensity] = camera.render_color(query, X_WC)
+            fine = camera.render_color(query, X_WC, samples=2)
+    middle = slice(230, 250), slice(414, 434)
+    assert levels[0.8][middle].mean() == pytest.approx(2.0 * levels[0.4][middle].mean(), rel=0.05)
+    np.testing.assert_allclose(fine[middle], levels[0.8][middle], atol=1)
+    between = (fine > 0.1 * fine.max()) & (fine < 0.9 * fine.max())
+    assert between.sum() > 100 and fine.shape == levels[0.8].shape
 
 
 @needs_rendering

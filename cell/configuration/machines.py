@@ -191,6 +191,10 @@ class CameraConfig:
         "[M] As p_MC; the fingers fill the lower fifth of the image.",
         at_least=-90.0, at_most=90.0,
     )  # fmt: skip
+    markers: bool = setting(
+        False, "", "Whether a board of printed markers lies around the jig; it is only seen.",
+        "[S] The paper's discussion: data are collected with visual markers.",
+    )  # fmt: skip
     height_above_jig: float = setting(
         0.5, "m", "Height of the fixed camera above the jig.",
         "[A] Own choice: the paper gives none.",

@@ -9,6 +9,7 @@ from pydrake.multibody.plant import MultibodyPlant
 from pydrake.multibody.tree import RigidBody, WeldJoint
 
 from cell.configuration.config import CellConfig
+from cell.machines.cameras.marker_board import add_marker_board
 from cell.paths import model_url, new_parser
 
 
@@ -42,6 +43,8 @@ def add_workcell(plant: MultibodyPlant, config: CellConfig, tray: str | None) ->
     _add_static(plant, "table", RigidTransform())
     _add_static(plant, "riser", X_WJ)
     plate_weld = _add_static(plant, "force_plate", X_WJ)
+    if config.camera.markers:
+        add_marker_board(plant, plate_weld.child_body())
     (instance,) = new_parser(plant).AddModelsFromUrl(model_url("jig_base"))
     base = plant.GetBodyByName("jig_base", instance)
     if config.workcell.jig_base_fixed:

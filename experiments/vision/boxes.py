@@ -4,9 +4,8 @@ from __future__ import annotations
 
 import io
 from collections.abc import Mapping
-from itertools import pairwise, product
+from itertools import pairwise
 
-import numpy as np
 from PIL import Image, ImageDraw
 from pydrake.math import RigidTransform
 
@@ -30,11 +29,9 @@ def with_boxes(
     assert picture.color is not None
     image = Image.fromarray(picture.color)
     draw = ImageDraw.Draw(image)
-    bounds = np.array([surface.lower, surface.upper])
-    corners = np.array([[bounds[i, k] for k, i in enumerate(c)] for c in product((0, 1), repeat=3)])
     for color, X_WP in poses.items():
         X_CP = picture.X_WC.inverse() @ X_WP
-        pixels = picture.pinhole.project((X_CP @ corners.T).T)
+        pixels = picture.pinhole.project((X_CP @ surface.corners.T).T)
         for ring in RINGS:
             for a, b in pairwise(ring):
                 draw.line([*map(tuple, pixels[[a, b]])], fill=color, width=2)

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RotationMatrix
 from scipy.spatial.transform import Rotation
 
 from cell.machines.cameras.pinhole import Pinhole
@@ -78,3 +78,19 @@ def pose_error(
         pixels=float(np.linalg.norm(seen - meant, axis=1).mean()),
         normalised=float(error @ np.linalg.solve(covariance, error)),
     )
+
+
+def apart(
+    X_AB: RigidTransform, X_ATrue: RigidTransform, p_BQ: np.ndarray | None = None
+) -> tuple[float, float]:
+    """Return by how much a pose is off, at a point of B [mm], and the angle of its turn [deg]."""
+    p_BQ = np.zeros(3) if p_BQ is None else p_BQ
+    turn = Rotation.from_matrix((X_ATrue.inverse() @ X_AB).rotation().matrix()).magnitude()
+    return float(1e3 * np.linalg.norm(X_AB @ p_BQ - X_ATrue @ p_BQ)), float(np.rad2deg(turn))
+
+
+def random_error(offset: float, angle_deg: float, rng: np.random.Generator) -> RigidTransform:
+    """Return an error of a stated size [m, deg] in a random direction, about a random axis."""
+    way, axis = (vector / np.linalg.norm(vector) for vector in rng.normal(size=(2, 3)))
+    turn = Rotation.from_rotvec(np.deg2rad(angle_deg) * axis).as_matrix()
+    return RigidTransform(RotationMatrix(turn), offset * way)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import dataclass, field
+from itertools import product
 
 import numpy as np
 import trimesh
@@ -71,6 +72,11 @@ class Surface:
     def size(self) -> float:
         """Diagonal of the bounding box [m]."""
         return float(np.linalg.norm(self.upper - self.lower))
+
+    @property
+    def corners(self) -> Array:
+        """(8, 3) of the bounding box: the number of one, in binary, says where it is upper [m]."""
+        return np.array(list(product(*zip(self.lower, self.upper, strict=True))))
 
     @property
     def centre(self) -> Array:

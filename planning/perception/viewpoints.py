@@ -14,6 +14,10 @@ from cell.machines.cameras.pinhole import looking_at
 DISTANCE = 0.28
 ELEVATIONS_DEG = (50.0, 75.0)  # From steep enough to see over the bag's rim to short of vertical.
 
+# Of scattered views [A]: as near as the depth allows, as far as markers of 40 mm are still sharp;
+# as flat as the arm reaches.
+SCATTERED_DISTANCES, SCATTERED_ELEVATIONS_DEG = (0.28, 0.42), (42.0, 84.0)
+ROLL_SPREAD_DEG = 20.0
 
 # Of a sector, in the order in which they are tried [deg] [A].
 SECTOR_AZIMUTHS_DEG, SECTOR_ELEVATIONS_DEG = (0.0, -30.0, 30.0), (60.0, 75.0, 50.0)
@@ -55,8 +59,24 @@ def sector(p_WTarget: np.ndarray, azimuth: float) -> Iterator[list[RigidTransfor
         yield [X_WC @ RigidTransform(R, np.zeros(3)) for X_WC in poses for R in rolls]
 
 
-def _from(p_WTarget: np.ndarray, azimuth: float, elevation: float) -> RigidTransform:
-    """Return the pose X_WC of an upright camera that looks at a point from an angle [rad]."""
+def scattered(p_WTarget: np.ndarray, rng: np.random.Generator) -> list[RigidTransform]:
+    """Return poses X_WC that look at a point from one random place, and differ in roll.
+
+    Args:
+        p_WTarget: (3,) [m].
+        rng: Draws the place, and how the camera is turned about its axis.
+    """
+    azimuth, elevation = rng.uniform(-np.pi, np.pi), rng.uniform(*SCATTERED_ELEVATIONS_DEG)
+    distance, aside = rng.uniform(*SCATTERED_DISTANCES), rng.uniform(-1.0, 1.0) * ROLL_SPREAD_DEG
+    X_WC = _from(p_WTarget, azimuth, np.deg2rad(elevation), distance)
+    turns = [RotationMatrix.MakeZRotation(a) for a in np.deg2rad(np.add(ROLLS_DEG, aside))]
+    return [X_WC @ RigidTransform(R, np.zeros(3)) for R in turns]
+
+
+def _from(
+    p_WTarget: np.ndarray, azimuth: float, elevation: float, distance: float = DISTANCE
+) -> RigidTransform:
+    """Return the pose X_WC of an upright camera that looks at a point from an angle [rad], [m]."""
     across = np.cos(elevation) * np.array([np.cos(azimuth), np.sin(azimuth), 0.0])
     ray = across + np.array([0.0, 0.0, np.sin(elevation)])
-    return looking_at(p_WTarget + DISTANCE * ray, p_WTarget)
+    return looking_at(p_WTarget + distance * ray, p_WTarget)

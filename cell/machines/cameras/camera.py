@@ -18,6 +18,7 @@ from pydrake.geometry import (
     ColorRenderCamera,
     DepthRange,
     DepthRenderCamera,
+    QueryObject,
     SceneGraph,
 )
 from pydrake.math import RigidTransform, RotationMatrix
@@ -28,7 +29,7 @@ from pydrake.systems.framework import Context
 from cell.configuration.machines import CameraConfig
 from cell.machines.arm import Arm
 from cell.machines.cameras.pinhole import Pinhole
-from cell.machines.cameras.rendering import camera_core, rendering
+from cell.machines.cameras.rendering import RENDERER, camera_core, rendering
 from cell.machines.cameras.stereo_depth import StereoDepth
 
 Array = NDArray[np.float64]
@@ -127,26 +128,56 @@ class Camera:
         Raises:
             NoRendering: This machine cannot render.
         """
-        X_WC, world = self.X_WC(root), self.scene_graph.world_frame_id()
-        core = camera_core(self.pinhole.drake)
-        near_to_far = DepthRange(core.clipping().near(), FARTHEST)
+        X_WC = self.X_WC(root)
         with rendering(self.scene_graph, root) as query:
-            depth = query.RenderDepthImage(DepthRenderCamera(core, near_to_far), world, X_WC)
-            true = np.array(depth.data[:, :, 0], float)
-            rgb = None
-            if color:
-                image = query.RenderColorImage(ColorRenderCamera(core, False), world, X_WC)
-                rgb = np.array(image.data[:, :, :3])
+            true = self.render_depth(query, X_WC)
+            rgb = self.render_color(query, X_WC) if color else None
         measured = self.stereo.measured(true, rng)
         return Picture(root.get_time(), X_WC, self.pinhole, measured, rgb)
 
     def labels(self, root: Context) -> NDArray[np.int64]:
         """Return the number of the body that each pixel shows (h, w): the truth."""
-        camera = ColorRenderCamera(camera_core(self.pinhole.drake), show_window=False)
         with rendering(self.scene_graph, root) as query:
-            image = query.RenderLabelImage(
-                camera, self.scene_graph.world_frame_id(), self.X_WC(root)
-            )
+            return self.render_labels(query, self.X_WC(root))
+
+    # What a renderer gives that is already there, see `rendering`: it is costly to make.
+
+    def render_depth(
+        self, query: QueryObject, X_WC: RigidTransform, renderer: str = RENDERER
+    ) -> Array:
+        """Return the true depth (h, w) [m]."""
+        core = camera_core(self.pinhole.drake, renderer)
+        near_to_far = DepthRange(core.clipping().near(), FARTHEST)
+        world = self.scene_graph.world_frame_id()
+        image = query.RenderDepthImage(DepthRenderCamera(core, near_to_far), world, X_WC)
+        return np.array(image.data[:, :, 0], float)
+
+    def render_color(
+        self, query: QueryObject, X_WC: RigidTransform, renderer: str = RENDERER, samples: int = 1
+    ) -> NDArray[np.uint8]:
+        """Return the colour image (h, w, 3), without noise.
+
+        Args:
+            query: Of `rendering`.
+            X_WC: Of the camera.
+            renderer: Its name there.
+            samples: Of a pixel along each axis, whose mean is taken, as a sensor does. With one,
+                edges are jagged, and those along the rows of pixels are off by up to half a pixel.
+        """
+        core = camera_core(self.pinhole.finer(samples).drake, renderer)
+        camera, world = ColorRenderCamera(core, False), self.scene_graph.world_frame_id()
+        rgb = np.array(query.RenderColorImage(camera, world, X_WC).data[:, :, :3])
+        if samples == 1:
+            return rgb
+        shape = self.pinhole.height, samples, self.pinhole.width, samples, 3
+        return np.round(rgb.reshape(shape).mean(axis=(1, 3))).astype(np.uint8)
+
+    def render_labels(
+        self, query: QueryObject, X_WC: RigidTransform, renderer: str = RENDERER
+    ) -> NDArray[np.int64]:
+        """Return the number of the body that each pixel shows (h, w)."""
+        camera = ColorRenderCamera(camera_core(self.pinhole.drake, renderer), show_window=False)
+        image = query.RenderLabelImage(camera, self.scene_graph.world_frame_id(), X_WC)
         return np.array(image.data[:, :, 0], int)
 
 

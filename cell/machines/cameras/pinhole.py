@@ -54,6 +54,12 @@ class Pinhole:
         """Return a camera whose optical axis meets the middle of its image."""
         return Pinhole(width, height, focal_length, (width - 1) / 2.0, (height - 1) / 2.0)
 
+    def finer(self, factor: int) -> Pinhole:
+        """Return the same camera with each pixel divided into so many along both axes."""
+        cx, cy = (factor * (c + HALF_PIXEL) - HALF_PIXEL for c in (self.cx, self.cy))
+        size = factor * self.width, factor * self.height
+        return Pinhole(*size, factor * self.focal_length, cx, cy)
+
     @property
     def matrix(self) -> Array:
         """(3, 3) K, as OpenCV takes it."""

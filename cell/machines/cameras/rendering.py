@@ -12,6 +12,7 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 
 from pydrake.geometry import (
     ClippingRange,
@@ -39,14 +40,58 @@ class NoRendering(RunFailure):
     """This machine cannot render, with the reason."""
 
 
-def camera_core(info: CameraInfo) -> RenderCameraCore:
-    """Return Drake's description of a camera that renders with `rendering`."""
-    return RenderCameraCore(RENDERER, info, CLIPPING, RigidTransform())
+@dataclass(frozen=True)
+class Lamp:
+    """Parallel light.
+
+    Attributes:
+        frame: Which it is fixed to: "world" or "camera".
+        direction: (3,) in which it shines, in that frame.
+        intensity: 1 shows a surface across it in its own colour.
+    """
+
+    frame: str
+    direction: tuple[float, float, float]
+    intensity: float
+
+
+@dataclass(frozen=True)
+class Lighting:
+    """How a scene is lit.
+
+    Attributes:
+        lamps: At least one.
+        background: Red, green and blue of what is behind everything, 0 to 1.
+    """
+
+    lamps: tuple[Lamp, ...]
+    background: tuple[float, float, float]
+
+
+# A key light from above, a weaker fill light, and a light at the camera.
+USUAL = Lighting(
+    (
+        Lamp("world", (-0.4, -0.5, -1.0), 0.8),
+        Lamp("world", (0.6, -0.3, -0.8), 0.4),
+        Lamp("camera", (0.0, 0.0, 1.0), 0.4),
+    ),
+    (0.93, 0.94, 0.96),
+)
+
+
+def camera_core(info: CameraInfo, renderer: str = RENDERER) -> RenderCameraCore:
+    """Return Drake's description of a camera that renders with `rendering`, under that name."""
+    return RenderCameraCore(renderer, info, CLIPPING, RigidTransform())
 
 
 @contextmanager
 def rendering(
-    scene_graph: SceneGraph, root: Context, *, shadows: bool = True
+    scene_graph: SceneGraph,
+    root: Context,
+    *,
+    shadows: bool = True,
+    lighting: Lighting = USUAL,
+    renderer: str = RENDERER,
 ) -> Iterator[QueryObject]:
     """Give a query object that renders the scene in its present state; the state is not changed.
 
@@ -54,6 +99,8 @@ def rendering(
         scene_graph: Its geometries with the perception role are rendered.
         root: Context of the diagram that the scene graph is in.
         shadows: Whether to render shadows, which have jagged edges in close-ups.
+        lighting: Of colour images.
+        renderer: Its name: several may be there at the same time.
 
     Raises:
         NoRendering: `rendering_problem` returns a reason.
@@ -61,27 +108,28 @@ def rendering(
     if reason := rendering_problem():
         raise NoRendering(reason)
     context = scene_graph.GetMyMutableContextFromRoot(root)
-    scene_graph.AddRenderer(context, RENDERER, MakeRenderEngineVtk(_engine_parameters(shadows)))
+    engine = MakeRenderEngineVtk(_engine_parameters(shadows, lighting))
+    scene_graph.AddRenderer(context, renderer, engine)
     # Otherwise the new renderer gets no poses that were computed before it was added.
     context.SetAllCacheEntriesOutOfDate()
     try:
         yield scene_graph.get_query_output_port().Eval(context)
     finally:
-        scene_graph.RemoveRenderer(context, RENDERER)
+        scene_graph.RemoveRenderer(context, renderer)
 
 
-def _engine_parameters(shadows: bool) -> RenderEngineVtkParams:
-    """Return a key light from above, a weaker fill light, and a light at the camera."""
+def _engine_parameters(shadows: bool, lighting: Lighting) -> RenderEngineVtkParams:
     lamps = [
-        LightParameter(type="directional", frame=frame, direction=direction, intensity=intensity)
-        for frame, direction, intensity in (
-            ("world", [-0.4, -0.5, -1.0], 0.8),
-            ("world", [0.6, -0.3, -0.8], 0.4),
-            ("camera", [0.0, 0.0, 1.0], 0.4),
+        LightParameter(
+            type="directional",
+            frame=lamp.frame,
+            direction=list(lamp.direction),
+            intensity=lamp.intensity,
         )
+        for lamp in lighting.lamps
     ]
     return RenderEngineVtkParams(
-        default_clear_color=[0.93, 0.94, 0.96],
+        default_clear_color=list(lighting.background),
         lights=lamps,
         cast_shadows=shadows,
         shadow_map_size=1024,
