@@ -13,6 +13,7 @@ from cell.products.loading import load_product
 from planning.operations.bolts import in_hole, play_share, screw_play, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
+from planning.operations.pick_place import PICK_PLACE
 from planning.operations.insert_shaft.phases import mating_of
 from planning.operations.log_rows import rows_between, rows_of
 from planning.operations.mating_measures import riders_standing, seat_errors
@@ -212,6 +213,15 @@ def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
     assert (failed.quantity, failed.value) == ("tilt_rad", None)
     (failed,) = insertion.failed_checks(limits | {"gap_m": float("nan")})
     assert failed.quantity == "gap_m"
+
+
+def test_limit_of_what_not_every_fixture_has_holds_where_it_was_measured() -> None:
+    placement = Step("place motor", PICK_PLACE, ("motor",))
+    kept = {limit.quantity: limit.limit for limit in PICK_PLACE.limits}
+    del kept["off_supports_m"]
+    assert not placement.failed_checks(kept)
+    (failed,) = placement.failed_checks(kept | {"off_supports_m": 2e-3})
+    assert failed.quantity == "off_supports_m"
 
 
 def test_limits_of_bolts_hold_for_each() -> None:
