@@ -57,7 +57,7 @@ def patches(points, normals, areas, *, depth=0.0, limit=1e9, mu=MU) -> ContactSp
     normals = np.tile(normals, (count, 1)) if np.ndim(normals) == 1 else normals
     return ContactSprings(
         np.asarray(points, float), normals, areas * same, depth * same, STIFF * same, limit * same,
-        mu * same,
+        mu * same, np.arange(count), np.inf * same, np.zeros((count, 3)),
     )  # fmt: skip
 
 
