@@ -131,7 +131,7 @@ def effort(fixture: Fixture) -> dict[str, float]:
     if isinstance(fixture, RigidJig):
         return {"parts to make": 1, "printed_cm3": 1e6 * float(fixture.mesh.volume)}
     if isinstance(fixture, SupportJig):
-        return {"supports to set": 3, "posts to set": len(fixture.posts.sides)}
+        return {"supports to set": 3, "posts to set": len(fixture.made.posts.sides)}
     return {"evacuations": 1}
 
 

@@ -273,7 +273,7 @@ def test_part_that_hangs_or_leans_is_off_its_supports(kind: str) -> None:
     level = RollPitchYaw(0.0, 0.0, 0.0)
     assert off(level, (0.0, 0.0, 3e-4)) == pytest.approx(3e-4)
     assert off(RollPitchYaw(0.0, 0.0, 0.3), (1e-3, 2e-3, 0.0)) == pytest.approx(0.0, abs=1e-9)
-    farthest = max((fixture.X_JD @ (fixture.supports.T / MM))[1])
+    farthest = max((fixture.X_JD @ (fixture.made.supports.T / MM))[1])
     assert off(RollPitchYaw(0.02, 0.0, 0.0), (0.0, 0.0, 0.0)) == pytest.approx(
         0.02 * farthest, rel=0.05
     )
@@ -301,7 +301,7 @@ def test_clamps_push_the_part_onto_its_locators_and_bear_an_upward_pull() -> Non
     context = cell.plant.GetMyContextFromRoot(root)
     X_DP = jig.X_JD.inverse() @ jig.pose(context).InvertAndCompose(cell.parts[PART].X_WP(context))
     points = MM * (X_DP @ cell.parts[PART].part.mesh.vertices.T).T
-    for post in jig.posts.sides:
+    for post in jig.made.posts.sides:
         if post.locates:
             gap = post.touch[:2] @ post.normal + post.gap - (points[:, :2] @ post.normal).max()
             assert abs(gap) < 0.03

@@ -13,12 +13,12 @@ from cell.products.loading import load_product
 from planning.operations.bolts import in_hole, play_share, screw_play, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.insert_shaft import INSERT_SHAFT
-from planning.operations.pick_place import PICK_PLACE
 from planning.operations.insert_shaft.phases import mating_of
 from planning.operations.log_rows import rows_between, rows_of
 from planning.operations.mating_measures import riders_standing, seat_errors
 from planning.operations.measures import force_plate_peaks, moved
 from planning.operations.operation import PhaseRecord, Step, StepRecord
+from planning.operations.pick_place import PICK_PLACE
 from planning.operations.placement import placement_errors
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.set_aside.measures import measure as measure_set_aside

@@ -16,9 +16,10 @@ from cell.bodies import full_name
 from cell.errors import RunFailure
 from cell.fixtures.soft_jig import SoftJig
 from cell.forces import applied_force
+from cell.vectors import cross
 from experiments.paper.rig.rig import Rig
 from experiments.paper.rig.rig_simulation import RigSimulation
-from planning.fixture_analysis.holding_map import ANGLE, WAY, Bearing
+from planning.fixture_analysis.holding_map import ANGLE, WAY, Bearing, depth_over_area
 
 RATE, MOST = 20.0, 40.0  # Of a force [N/s], [N]; faster ramps overstate holding by 1 to 2 N [M].
 TURN_RATE, TURN_MOST = 0.5, 1.5  # Of a moment [N m/s], [N m].
@@ -26,7 +27,6 @@ TURN_RATE, TURN_MOST = 0.5, 1.5  # Of a moment [N m/s], [N m].
 SIDEWAYS = tuple(f"force {way}" for way in ("+x", "-x", "+y", "-y"))  # In J.
 LIFT = "force +z"
 LOADS = (*SIDEWAYS, LIFT, "moment x", "moment y", "moment z")
-NOTHING = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -103,7 +103,12 @@ class _Watch:
     def __init__(self, rig: Rig, root: Context) -> None:
         self._rig, self._root, self._start = rig, root, _pose(rig, root)
         self._name = full_name(rig.part.body)
-        self._vertices, self._sealed = self._surface(), self._suction()
+        self._sealed = self._suction()
+        if isinstance(rig.fixture, SoftJig):
+            mesh = rig.fixture.memory(root).mesh
+            self._vertices, self._faces = mesh.vertices.copy(), mesh.boundary()
+            a, b, c = self._vertices[self._faces].transpose(1, 0, 2)
+            self._areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
 
     def height(self, p_PG: np.ndarray) -> float:
         """Return the height of the mass centre over the lowest point of the part [m]."""
@@ -117,15 +122,17 @@ class _Watch:
         return np.concatenate([turn.angle() * turn.axis(), now @ p_PG - self._start @ p_PG])
 
     def bed(self) -> tuple[float, float]:
-        """Return how far the bed has given way for good [m], and the share of suction lost."""
-        moves = self._surface() - self._vertices
-        way = float(np.linalg.norm(moves, axis=1).max(initial=0.0))
-        return way, 1.0 - self._suction() / self._sealed if self._sealed else 0.0
+        """Return how far the bed has given way for good [m], and the share of suction lost.
 
-    def _surface(self) -> np.ndarray:
-        """Return the vertices (n, 3) of the bed [m]; none of a fixture that does not yield."""
+        The first by area, as the holding map has it; nothing of a fixture that does not yield.
+        """
         fixture = self._rig.fixture
-        return fixture.memory(self._root).mesh.vertices if isinstance(fixture, SoftJig) else NOTHING
+        if not isinstance(fixture, SoftJig):
+            return 0.0, 0.0
+        moves = np.linalg.norm(fixture.memory(self._root).mesh.vertices - self._vertices, axis=1)
+        depths = moves[self._faces].mean(axis=1)
+        way = float(depth_over_area(depths[None], self._areas)[0])
+        return way, 1.0 - self._suction() / self._sealed if self._sealed else 0.0
 
     def _suction(self) -> float:
         """Return the area that is still sealed [m2]."""

@@ -218,7 +218,7 @@ def check_fits(config: CellConfig, product: Product, posture: Posture) -> None:
         FixtureError: A fixture cannot be made for it.
     """
     if work := fixture_work(held(config, posture), gripped(product, posture)):
-        cast(type[CustomFixture], fixture_class(config.workcell.fixture)).check(work)
+        cast(type[CustomFixture], fixture_class(config.workcell.fixture)).design(work)
         return
     part = product.parts[posture.part]
     R_WP = upright(posture.up, 0.0)

@@ -128,7 +128,9 @@ def place_fault(trial: TrialRecord, measured: Measured) -> str:
         return f"it still moves at {1e3 * speed:.1f} mm/s"
     raised, error = measured.get("off_supports_m", 0.0), measured.get("seat_error_m", 0.0)
     if not raised < ON_SUPPORTS:
-        return f"wedged: it stands {1e3 * raised:.2f} mm off a support, {1e3 * ON_SUPPORTS:g} at most"
+        return (
+            f"wedged: it stands {1e3 * raised:.2f} mm off a support, {1e3 * ON_SUPPORTS:g} at most"
+        )
     if not error < SEATED:
         return f"it is {1e3 * error:.2f} mm from its seat, {1e3 * SEATED:g} mm at most"
     return ""

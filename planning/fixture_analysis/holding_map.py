@@ -37,9 +37,11 @@ CRITERIA: Mapping[str, str] = {
 """What can fail first, and when it has failed."""
 
 YIELDED, YIELDED_AREA, SEAL_LOST = 2e-4, 2.5e-5, 0.5
-# A load begins with this force [N] and grows by this share of itself. It waits until the forces are
-# in balance within half of what it grew by, but no more than some steps.
-FIRST, GROWTH, PATIENCE = 0.02, 0.015, 100
+# A load begins with this force [N] and grows by this share of itself, and by the smaller share once
+# the part has moved by `EARLY` of what ends the ramp. It waits until the forces are in balance
+# within half of what it grew by, but no more than some steps.
+FIRST, GROWTH, CAREFUL, PATIENCE = 0.05, 0.03, 0.01, 20
+EARLY = 0.1
 MOST_STEPS = 5000
 
 
@@ -142,7 +144,7 @@ def holding_map(
     directions: Array,
     *,
     steady: Array | None = None,
-    most: float = 100.0,
+    most: float | Array = 100.0,
 ) -> list[Bearing]:
     """Return what a fixture bears along each direction.
 
@@ -153,7 +155,7 @@ def holding_map(
         directions: (d, 6) wrenches about the centre of mass in J, moment [N m] first, then force
             [N]; each is applied as a growing multiple of itself.
         steady: (6,) wrench about the centre of mass that acts throughout, besides the weight.
-        most: Multiple at which a ramp ends.
+        most: Multiple at which a ramp ends, of all directions or (d,) of each.
     """
     always = np.array([0.0, 0.0, 0.0, 0.0, 0.0, -weight])
     always = always if steady is None else always + steady
@@ -161,11 +163,12 @@ def holding_map(
     with threadpool_limits(1, user_api="blas"):
         body = SprungBody(contacts, p_JG)
         rest = body.rest(always)
-        return _ramp(body, rest, always, np.asarray(directions, dtype=float), most)
+        directions = np.asarray(directions, dtype=float)
+        return _ramp(body, rest, always, directions, np.broadcast_to(most, len(directions)))
 
 
 def _ramp(
-    body: SprungBody, rest: State, always: Array, directions: Array, most: float
+    body: SprungBody, rest: State, always: Array, directions: Array, most: Array
 ) -> list[Bearing]:
     """Load a part at rest along all directions, each until it has moved or bears the most."""
     count = len(directions)
@@ -182,7 +185,7 @@ def _ramp(
         )
         state.put(moving, now)
         motion = now.moved - rest.moved
-        yielded = _over_area(now.yielded - rest.yielded, body.areas)
+        yielded = depth_over_area(now.yielded - rest.yielded, body.areas)
         lost = (
             1.0 - now.intact @ body.suction.forces / whole
             if len(body.suction.forces)
@@ -192,20 +195,27 @@ def _ramp(
             moving, np.column_stack([load[moving], motion, yielded, lost]), strict=True
         ):
             rows[k].append(row)
-        held = np.linalg.norm(motion[:, 3:], axis=1) < WAY
-        held &= (np.linalg.norm(motion[:, :3], axis=1) < ANGLE) & (load[moving] < most)
+        way, angle = (np.linalg.norm(motion[:, k : k + 3], axis=1) for k in (3, 0))
+        moved = np.maximum(way / WAY, angle / ANGLE)
+        held = (moved < 1.0) & (load[moving] < most[moving])
         waited[moving] += 1
         balanced = (unbalanced < 0.5 * grew[moving] * size[moving]) | (waited[moving] > PATIENCE)
         grown = moving[held & balanced]
-        waited[grown], grew[grown] = 0, GROWTH * load[grown] + FIRST / size[grown]
-        load[grown] = np.minimum(load[grown] + grew[grown], most)
+        more = np.where(moved > EARLY, CAREFUL, GROWTH)[held & balanced]
+        waited[grown], grew[grown] = 0, more * load[grown] + FIRST / size[grown] * (more == GROWTH)
+        load[grown] = np.minimum(load[grown] + grew[grown], most[grown])
         moving = moving[held]
     tables = [np.array(own) for own in rows]
     return [Bearing.of(own[:, 0], own[:, 1:7], body.height, own[:, 7], own[:, 8]) for own in tables]
 
 
-def _over_area(depths: Array, areas: Array) -> Array:
-    """Return the depth (d,) that depths (d, n) of patches exceed over `YIELDED_AREA` [m]."""
+def depth_over_area(depths: Array, areas: Array) -> Array:
+    """Return the depth (d,) that depths (d, n) of patches exceed over `YIELDED_AREA` [m].
+
+    Args:
+        depths: By which each patch has given way [m].
+        areas: (n,) of the patches [m2].
+    """
     order = np.argsort(-depths, axis=1)
     reached = np.cumsum(areas[order], axis=1) >= YIELDED_AREA
     which = np.argmax(reached, axis=1)

@@ -9,8 +9,7 @@ import numpy as np
 
 from cell.fixtures.soft_jig import JigParameters
 from planning.fixture_analysis.capacity import sideways_capacity, turning_capacity
-from planning.fixture_analysis.frozen_body import FrozenBody
-from planning.fixture_analysis.holding_map import holding_map
+from planning.fixture_analysis.held_body import HeldBody
 from planning.fixture_analysis.imprint import Imprint
 from planning.fixture_analysis.loads import OperationLoad
 
@@ -57,13 +56,11 @@ def margin_by_formula(
     return Margin(across[worst], bears / load.torque if load.torque else np.inf, load)
 
 
-def margin_by_map(
-    body: FrozenBody, p_JMiddle: np.ndarray, loads: Sequence[OperationLoad]
-) -> Margin:
+def margin_by_map(body: HeldBody, p_JMiddle: np.ndarray, loads: Sequence[OperationLoad]) -> Margin:
     """Return the margin by the holding map: how often the body bears the whole of each load.
 
     Args:
-        body: In the frozen bed.
+        body: On its fixture.
         p_JMiddle: (3,) where the plane of the loads has its origin, at the body's lowest point [m].
         loads: Of the operation.
     """
@@ -79,7 +76,7 @@ def margin_by_map(
         if load.torque
     ]
     wrenches = np.array([wrench for _, wrench in pushes] + turns)
-    found = holding_map(body.contacts, body.p_JG, body.weight, wrenches, most=MOST)
+    found = body.bears(wrenches, MOST)
     turning = found[-1].load if turns else np.inf
     worst = int(np.argmin([bearing.load for bearing in found[: len(pushes)]]))
     bearing = found[worst]
@@ -87,7 +84,7 @@ def margin_by_map(
 
 
 def _wrench(
-    body: FrozenBody, p_JMiddle: np.ndarray, load: OperationLoad, force: np.ndarray
+    body: HeldBody, p_JMiddle: np.ndarray, load: OperationLoad, force: np.ndarray
 ) -> np.ndarray:
     """Return the wrench (6,) about the centre of gravity of a force (3,) at a load's point."""
     p_JQ = p_JMiddle + np.array([*load.p_Q, load.height])

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from cell.fixtures.contacts import Contacts
+from cell.fixtures.contacts import STRONG, Contacts
 from cell.vectors import cross
 
 Array = NDArray[np.float64]
@@ -27,7 +27,9 @@ Array = NDArray[np.float64]
 SHEAR = 5.0
 # Viscosity of the pseudo-time [N per m and step], and the lever by which it holds turning [m].
 VISCOSITY, LEVER = 2.0e3, 0.02
-LARGEST = 1e-4  # Displacement in an iteration [m].
+# Displacement in an iteration [m]: a part that ran a tenth of a millimetre into a wall that does
+# not yield would be thrown off in the next one.
+LARGEST, LARGEST_RIGID = 1e-4, 1e-5
 ITERATIONS, SETTLING = 3, 200
 AT_REST = 2e-3  # What may be unbalanced at rest [N].
 
@@ -112,6 +114,8 @@ class SprungBody:
         self._opening = _rows(self.suction.normals, lever)
         tiled = (np.tile(axis, (len(lever), 1)) for axis in np.eye(3))
         self._shifting = np.concatenate([_rows(axis, lever) for axis in tiled])
+        rigid = bool(np.any(springs.limits >= STRONG))
+        self._largest = LARGEST_RIGID if rigid else LARGEST
         self._viscous = np.diag(VISCOSITY * np.array([LEVER, LEVER, LEVER, 1.0, 1.0, 1.0]) ** 2)
 
     def rest(self, load: Array) -> State:
@@ -134,7 +138,7 @@ class SprungBody:
             wrench, stiffness, _ = self._forces(state, moved)
             residual = wrench + load - (moved - state.moved) @ self._viscous
             change = np.linalg.solve(stiffness + self._viscous, residual[:, :, None])[:, :, 0]
-            shorter = np.minimum(1.0, LARGEST / np.maximum(_length(change), 1e-12))
+            shorter = np.minimum(1.0, self._largest / np.maximum(_length(change), 1e-12))
             moved = moved + change * shorter[:, None]
         wrench, _, after = self._forces(state, moved)
         return after, wrench_size(wrench + load)
@@ -148,9 +152,7 @@ class SprungBody:
         depth = springs.depths - back @ self._turned.T - shift @ springs.normals.T
         away = back @ self._turned_bounds.T + shift @ self._bound_normals.T
         pressed = np.maximum(springs.stiffness * (depth - state.yielded), 0.0)
-        pressed[:, self._bounded] *= (
-            depth[:, self._bounded] <= springs.bounds[self._bounded] - away
-        )
+        pressed[:, self._bounded] *= depth[:, self._bounded] <= springs.bounds[self._bounded] - away
         touching = springs.areas * (pressed > 0.0)
         area = self._total(touching)
         some = np.maximum(area, 1e-12)
@@ -214,7 +216,7 @@ def _rows(axes: Array, arms: Array) -> Array:
 
 def _products(a: Array, b: Array) -> Array:
     """Return the outer product of each row of a with that of b, flat (n, ...)."""
-    return (a[:, :, None] * b[:, None, :]).reshape(len(a), -1)
+    return (a[:, :, None] * b[:, None, :]).reshape(len(a), a.shape[1] * b.shape[1])
 
 
 def _rotations(turns: Array) -> Array:
