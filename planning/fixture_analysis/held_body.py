@@ -42,6 +42,23 @@ class HeldBody:
         )
 
 
+@dataclass(frozen=True, eq=False)
+class LoadCase:
+    """A load of an operation on the body that a fixture holds, and what is borne of it.
+
+    Attributes:
+        force: (3,) in J [N].
+        torque: About the vertical [N m].
+        p_JQ: (3,) where the force acts [m].
+        bearing: In multiples of this load.
+    """
+
+    force: np.ndarray
+    torque: float
+    p_JQ: np.ndarray
+    bearing: Bearing
+
+
 def seated_body(
     design: Design, work: Work, solids: Sequence[Solid], X_AP: RigidTransform
 ) -> HeldBody:
