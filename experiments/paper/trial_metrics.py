@@ -114,6 +114,12 @@ def force_peaks(time: np.ndarray, force: np.ndarray, begun: float) -> int:
     return 1 + int(pushing.max() - rest >= VISIBLE * (placing.max() - rest))
 
 
+def stands(trial: TrialRecord, measured: Measured) -> bool:
+    """Return whether the part is upright and at rest."""
+    stood = trial.failure is None and trial.placed is not None
+    return stood and measured["tilt_rad"] < UPRIGHT and measured["speed_m_per_s"] < AT_REST
+
+
 def place_fault(trial: TrialRecord, measured: Measured) -> str:
     """Return why a placement is no success, in words; "" if it is one.
 
@@ -121,11 +127,12 @@ def place_fault(trial: TrialRecord, measured: Measured) -> str:
     """
     if trial.failure is not None or trial.placed is None:
         return "it was not placed"
-    tilt, speed = measured["tilt_rad"], measured["speed_m_per_s"]
-    if not tilt < UPRIGHT:
-        return f"it leans by {np.rad2deg(tilt):.1f} deg, {np.rad2deg(UPRIGHT):g} deg at most"
-    if not speed < AT_REST:
-        return f"it still moves at {1e3 * speed:.1f} mm/s"
+    if not stands(trial, measured):
+        tilt, speed = measured["tilt_rad"], measured["speed_m_per_s"]
+        return (
+            f"it leans by {np.rad2deg(tilt):.1f} deg and moves at {1e3 * speed:.1f} mm/s, "
+            f"{np.rad2deg(UPRIGHT):g} deg and {1e3 * AT_REST:g} mm/s at most"
+        )
     raised, error = measured.get("off_supports_m", 0.0), measured.get("seat_error_m", 0.0)
     if not raised < ON_SUPPORTS:
         return (
