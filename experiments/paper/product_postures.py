@@ -1,7 +1,7 @@
-"""Postures of any product's parts on a fixture, with the grasp by which the rig's hand can place them.
+"""Postures of any product's parts, with the grasp by which the rig's hand can place them.
 
-Those of the motor unit are the paper's. Of others it is each part that is no screw, with each of the
-six axes up, as far as one of its grasps brings it in that posture: from above or from the side,
+Those of the motor unit are the paper's. Of others it is each part that is no screw, with each of
+the six axes up, as far as one of its grasps brings it in that posture: from above or from the side,
 with jaws that close level.
 """
 

@@ -37,10 +37,11 @@ CRITERIA: Mapping[str, str] = {
 """What can fail first, and when it has failed."""
 
 YIELDED, YIELDED_AREA, SEAL_LOST = 2e-4, 2.5e-5, 0.5
-# A load begins with this force [N] and grows by this share of itself, and by the smaller share once
-# the part has moved by `EARLY` of what ends the ramp. It waits until the forces are in balance
-# within half of what it grew by, but no more than some steps.
-FIRST, GROWTH, CAREFUL, PATIENCE = 0.05, 0.03, 0.01, 20
+# A load begins with this force [N] and grows by this share of itself. Once the part has moved by
+# `EARLY` of what ends the ramp, the last growth is taken back, and it goes on by the smaller share.
+# It waits until the forces are in balance within half of what it grew by, but no more than some
+# steps.
+FIRST, GROWTH, CAREFUL, PATIENCE = 0.05, 0.06, 0.01, 40
 EARLY = 0.1
 MOST_STEPS = 5000
 
@@ -172,10 +173,12 @@ def _ramp(
 ) -> list[Bearing]:
     """Load a part at rest along all directions, each until it has moved or bears the most."""
     count = len(directions)
-    state, moving = rest.repeated(count), np.arange(count)
-    size = wrench_size(directions)
+    state, moving, size = rest.repeated(count), np.arange(count), wrench_size(directions)
     load, grew, waited = np.zeros(count), FIRST / size, np.zeros(count)
     rows: list[list[Array]] = [[] for _ in range(count)]
+    # What a growth is taken back to: state, load and rows before it.
+    before, before_load, before_rows = rest.repeated(count), load.copy(), np.zeros(count, int)
+    careful = np.zeros(count, dtype=bool)
     whole = max(float(body.suction.forces @ rest.intact[0]), 1e-9)
     for _ in range(MOST_STEPS):
         if not len(moving):
@@ -197,12 +200,21 @@ def _ramp(
             rows[k].append(row)
         way, angle = (np.linalg.norm(motion[:, k : k + 3], axis=1) for k in (3, 0))
         moved = np.maximum(way / WAY, angle / ANGLE)
+        back = moving[(moved > EARLY) & ~careful[moving]]
+        state.put(back, before.at(back))
+        load[back], careful[back], waited[back] = before_load[back], True, 0
+        for k in back:
+            del rows[k][before_rows[k] :]
         held = (moved < 1.0) & (load[moving] < most[moving])
+        held |= np.isin(moving, back)
         waited[moving] += 1
         balanced = (unbalanced < 0.5 * grew[moving] * size[moving]) | (waited[moving] > PATIENCE)
-        grown = moving[held & balanced]
-        more = np.where(moved > EARLY, CAREFUL, GROWTH)[held & balanced]
-        waited[grown], grew[grown] = 0, more * load[grown] + FIRST / size[grown] * (more == GROWTH)
+        grown = moving[held & (balanced | np.isin(moving, back))]
+        early = grown[~careful[grown]]
+        before.put(early, state.at(early))
+        before_load[early], before_rows[early] = load[early], [len(rows[k]) for k in early]
+        share, first = np.where(careful[grown], [[CAREFUL], [0.1]], [[GROWTH], [1.0]])
+        waited[grown], grew[grown] = 0, share * load[grown] + first * FIRST / size[grown]
         load[grown] = np.minimum(load[grown] + grew[grown], most[grown])
         moving = moving[held]
     tables = [np.array(own) for own in rows]

@@ -26,7 +26,7 @@ Array = NDArray[np.float64]
 # normal ones slip at a twentieth of the way [A].
 SHEAR = 5.0
 # Viscosity of the pseudo-time [N per m and step], and the lever by which it holds turning [m].
-VISCOSITY, LEVER = 2.0e3, 0.02
+VISCOSITY, LEVER = 1.0e3, 0.02
 # Displacement in an iteration [m]: a part that ran a tenth of a millimetre into a wall that does
 # not yield would be thrown off in the next one.
 LARGEST, LARGEST_RIGID = 1e-4, 1e-5
