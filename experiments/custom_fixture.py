@@ -90,7 +90,7 @@ def settings(fixture: CustomFixture) -> dict[str, Any]:
         "pads_mm": fixture.datum.pads.tolist(),
     }
     if isinstance(fixture, SupportJig):
-        found["supports_mm"] = fixture.made.posts.supports.tolist()
+        found["supports_mm"] = fixture.posts.supports.tolist()
         found["posts"] = [
             {
                 "side": post.side,
@@ -98,7 +98,7 @@ def settings(fixture: CustomFixture) -> dict[str, Any]:
                 "face_mm": [*post.touch[:2].tolist()],
                 "gap_mm": post.gap,
             }
-            for post in fixture.made.posts.sides
+            for post in fixture.posts.sides
         ]
     return found
 

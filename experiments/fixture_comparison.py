@@ -202,7 +202,7 @@ def effort(fixture: Fixture) -> dict[str, float]:
     if isinstance(fixture, RigidJig):
         return {"parts to make": 1, "printed_cm3": 1e6 * float(fixture.mesh.volume)}
     if isinstance(fixture, SupportJig):
-        return {"supports to set": 3, "posts to set": len(fixture.made.posts.sides)}
+        return {"supports to set": 3, "posts to set": len(fixture.posts.sides)}
     return {"evacuations": 1}
 
 
@@ -303,9 +303,12 @@ def rows_in(file: Path, about: Mapping[str, Any]) -> list[Row]:
         made = found["about"]
     except (ValueError, KeyError, TypeError) as error:
         raise InputError(f"'{file}' is not a table of this script: {error}.") from error
-    if made != about:
+    differ = [
+        f"{key} {made.get(key)}, now {about[key]}" for key in about if made.get(key) != about[key]
+    ]
+    if differ:
         raise InputError(
-            f"'{file}' was made with {made}, not with {about}: choose another --out, or remove it."
+            f"'{file}' has other {'; '.join(differ)}: choose another --out, or remove it."
         )
     return rows
 
@@ -333,7 +336,7 @@ def run(options: ComparisonOptions) -> int:
             started = time.process_time()
             if each.key not in done:
                 rows.append(compare(config, each, options))
-                write_json(out / FILE, to_dict(rows) | {"about": about})
+                write_json(out / FILE, {**to_dict(rows), "about": about})
             said = "done before" if each.key in done else rows[-1].refused or "done"
             spent = time.process_time() - started
             console.print(

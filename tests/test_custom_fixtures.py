@@ -301,7 +301,7 @@ def test_clamps_push_the_part_onto_its_locators_and_bear_an_upward_pull() -> Non
     context = cell.plant.GetMyContextFromRoot(root)
     X_DP = jig.X_JD.inverse() @ jig.pose(context).InvertAndCompose(cell.parts[PART].X_WP(context))
     points = MM * (X_DP @ cell.parts[PART].part.mesh.vertices.T).T
-    for post in jig.made.posts.sides:
+    for post in jig.posts.sides:
         if post.locates:
             gap = post.touch[:2] @ post.normal + post.gap - (points[:, :2] @ post.normal).max()
             assert abs(gap) < 0.03
