@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -17,9 +16,7 @@ from planning.fixture_analysis.held_body import GRAVITY, HeldBody
 from planning.fixture_analysis.imprint import Imprint, depth_in_bed
 from planning.fixture_analysis.loads import OperationLoad, operation_load
 from planning.fixture_analysis.margins import Margin, margin_by_formula, margin_by_map
-
-if TYPE_CHECKING:
-    from planning.fixture_analysis.evaluator import Evaluator
+from planning.fixture_analysis.shared_analysis import SharedAnalysis
 
 BED_YIELDS = 0.001  # [m] [A] One bead: less overlap than that is within bed compliance and grid.
 MAX_EXCESS = 0.05  # [A] Share of the imprint's volume that the bed may fail to take up: less than
@@ -33,7 +30,7 @@ class Rejected(Exception):
 class Evaluation:
     """One candidate under evaluation, with its figures and notes so far."""
 
-    def __init__(self, shared: Evaluator, proposal: Proposal, mapped: bool) -> None:
+    def __init__(self, shared: SharedAnalysis, proposal: Proposal, mapped: bool) -> None:
         self.shared, self.proposal, self.mapped = shared, proposal, mapped
         self.solids, self.setup = shared.matrices.solids, shared.setup
         self.R_JA = rotation_with_up(proposal.up).matrix()
