@@ -1,11 +1,13 @@
-"""The holding map against simulated pulls: what the soft jig bears, by direction.
+"""The holding map against simulated pulls: what a fixture bears, by direction.
 
     python -m experiments.holding_map --case motor/P2 --out out/holding_map
+    python -m experiments.holding_map --case plate/P1 --fixture rigid_jig
 
-For a part in a posture, the map says from the planner's imprint, before anything runs, which force
-and moment the frozen bed bears in each direction and what fails first. Then a hand presses the part
-in, the bed freezes, and the part is pulled in the same directions at 20 N/s, in a copy of the same
-state each time. Prints both with their ratio, and writes holding_map.json and holding_map.png.
+For a part in a posture, the map says, before anything runs, which force and moment the fixture
+bears in each direction and what fails first: the soft jig from the planner's imprint, a fixture
+that is made for the part from its design. Then a hand presses the part in, and the part is pulled
+in the same directions at 20 N/s, in a copy of the same state each time. Prints both with their
+ratio, and writes holding_map.json and holding_map.png.
 """
 
 from __future__ import annotations
@@ -14,7 +16,7 @@ import sys
 import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field, replace
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal, cast
 
 import numpy as np
 import tyro
@@ -27,23 +29,27 @@ from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
 from cell.configuration.config import CellConfig
 from cell.errors import RunFailure
+from cell.fixtures import FixtureError, fixture_class
+from cell.fixtures.custom.fixture import CustomFixture
+from cell.machines.grippers import HAND_E
 from cell.products.loading import load_product
 from cell.products.product import Product
+from cell.workpieces.work import fixture_work
 from experiments.cli.common import Common
 from experiments.cli.ending import exit_code
 from experiments.paper.cases import case_seed
-from experiments.paper.holding import MOST, pull
+from experiments.paper.holding import MOST, TURN_MOST, pull
 from experiments.paper.postures import POSTURES, Posture, chosen
 from experiments.paper.rig_hand import RigBench
-from experiments.paper.trial import TrialDisturbance, check_fits, gripped, run_trial, upright
+from experiments.paper.trial import TrialDisturbance, check_fits, gripped, held, run_trial, upright
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.plots import DPI, figure_png
 from planning.feasibility.solids import solids_of
-from planning.fixture_analysis.frozen_body import FrozenBody, HeldPart, frozen_body
-from planning.fixture_analysis.holding_map import Bearing, holding_map, sphere_of_forces
+from planning.fixture_analysis.frozen_body import HeldPart, frozen_body
+from planning.fixture_analysis.held_body import HeldBody, seated_body
+from planning.fixture_analysis.holding_map import Bearing, sphere_of_forces
 
 EXACT = {
-    "workcell.fixture": "soft_jig",
     "push.grasp_position_sigma": 0.0,
     "push.grasp_angle_sigma_deg": 0.0,
     "push.jig_position_sigma": 0.0,
@@ -57,6 +63,9 @@ class MapOptions:
 
     case: Annotated[str | None, arg(metavar="motor/P2")] = None
     """A posture, or a part for all of its postures. Default: all six."""
+
+    fixture: Literal["soft_jig", "rigid_jig", "support_jig"] = "soft_jig"
+    """What holds the part."""
 
     directions: int = 30
     """Directions of the force, spread over the sphere; the six axes of moment come in addition."""
@@ -98,14 +107,22 @@ class Row:
         return self.mapped.criterion == self.pulled.criterion if self.mapped.criterion else None
 
 
-def mapped_body(config: CellConfig, product: Product, posture: Posture) -> FrozenBody:
-    """Return a part in its posture in the frozen bed, as the planner computes it."""
+def mapped_body(config: CellConfig, product: Product, posture: Posture) -> HeldBody:
+    """Return a part in its posture on its fixture, as the planner computes it.
+
+    Raises:
+        FixtureError: A fixture cannot be made for it.
+    """
     part = replace(product.parts[posture.part], X_AP=RigidTransform())
-    (solid,) = solids_of(replace(gripped(product, posture), parts={part.name: part})).values()
-    held = HeldPart.of(part, solid, config.jig.jammed.friction)
+    alone = gripped(product, posture)
+    (solid,) = solids_of(replace(alone, parts={part.name: part})).values()
+    if work := fixture_work(held(config, posture), alone, HAND_E):
+        kind = cast(type[CustomFixture], fixture_class(config.workcell.fixture))
+        return seated_body(kind.design(work), work, [solid], RigidTransform())
+    felt = HeldPart.of(part, solid, config.jig.jammed.friction)
     R_JP = upright(posture.up, 0.0).matrix()
     p_middle = (R_JP @ part.mesh.center_mass)[:2]
-    return frozen_body([held], [solid], R_JP, p_middle, config.jig, config.placement.press_force)
+    return frozen_body([felt], [solid], R_JP, p_middle, config.jig, config.placement.press_force)
 
 
 def study(
@@ -121,7 +138,7 @@ def study(
     body = mapped_body(config, product, posture)
     moments = np.vstack([np.eye(6)[:3], -np.eye(6)[:3]])
     directions = np.vstack([sphere_of_forces(options.directions), moments + 0.0])
-    found = holding_map(body.contacts, body.p_JG, body.weight, directions, most=MOST)
+    found = body.bears(directions, np.where(directions[:, :3].any(axis=1), TURN_MOST, MOST))
     seconds = time.process_time() - started
     pulled: list[Bearing | None] = [None] * len(found)
     if options.pulls:
@@ -209,13 +226,20 @@ def plot(rows: Sequence[Row]) -> bytes:
 def run(options: MapOptions) -> int:
     """Run the script; return the exit code."""
     config = options.common.load_config().with_changes(EXACT)
+    config = config.with_changes({"workcell.fixture": options.fixture})
     product, console = load_product("motor_unit"), Console(quiet=options.common.quiet, width=140)
     postures = chosen("posture to hold", POSTURES, options.case)
     rows: list[Row] = []
     summaries = []
     with output_folder(options.common.out) as out:
         for posture in postures:
-            own, seconds = study(config, product, posture, options)
+            try:
+                own, seconds = study(config, product, posture, options)
+            except FixtureError as error:
+                if len(postures) == 1:
+                    raise
+                console.print(f"{posture.label}: refused. {error}", markup=False)
+                continue
             rows += own
             summaries.append(summary(own, seconds))
             console.print(table(own))

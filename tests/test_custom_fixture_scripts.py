@@ -8,14 +8,20 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
+import tyro
 
 from cell import CellConfig, load_product
 from cell.errors import InputError
 from cell.fixtures.base import FixtureError
+from cell.vectors import rotation_with_up
+from experiments import fixture_comparison
 from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.custom_fixture import main as write_fixture
+from experiments.fixture_comparison import ComparisonOptions, Row
 from experiments.fixture_comparison import main as compare_fixtures
+from experiments.paper.larger_part import larger
 from experiments.paper.postures import POSTURES
+from experiments.paper.product_postures import postures_of
 from experiments.paper.rig_hand import RigBench
 from experiments.paper.trial import TrialDisturbance, check_fits, run_trial
 from experiments.paper.trial_metrics import measure_place
@@ -90,13 +96,68 @@ def test_scripts_refuse_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[
 
 @pytest.mark.slow
 def test_comparison_of_one_posture(tmp_path: Path) -> None:
-    arguments = ["--case", "plate/P1", "--trials", "1", "--quiet", "--out", str(tmp_path)]
+    arguments = ["--products", "motor_unit", "--case", "plate/P1", "--trials", "1"]
+    arguments += ["--quiet", "--out", str(tmp_path)]
     assert compare_fixtures(arguments) == 0
     rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
-    soft, posts, nest = rows
-    assert [row["refused"] for row in rows] == ["", "", ""]
+    assert [row["refused"] for row in rows] == [""] * 7
+    drawn = {row["fixture"]: row for row in rows if not row["larger_m"]}
+    soft, posts, nest = (drawn[name] for name in ("soft_jig", "support_jig", "rigid_jig"))
     assert soft["holds"]["force +z"]["load"] > 3 * nest["holds"]["force +z"]["load"]
-    # The weight, 0.68 N, and what a stalled wall adds.
     for rigid in (posts, nest):
-        assert 0.5 < rigid["holds"]["force +z"]["load"] < 2.0
+        assert 0.6 < rigid["holds"]["force +z"]["load"] < 1.0  # The weight is 0.67 N.
         assert rigid["holds"]["force +y"]["load"] > soft["holds"]["force +y"]["load"] / 3
+
+
+def test_interrupted_comparison_is_continued(tmp_path: Path, monkeypatch, capsys) -> None:
+    """Rows that are there are kept, also those that were refused; another seed is refused."""
+    made: list[tuple] = []
+
+    def counted(config, wanted, options) -> Row:
+        made.append(wanted.key)
+        if len(made) == 2:
+            raise KeyboardInterrupt
+        return Row(wanted.source, wanted.fixture, wanted.posture.label, wanted.larger, "no")
+
+    monkeypatch.setattr(fixture_comparison, "compare", counted)
+    arguments = [
+        "--products",
+        "motor_unit",
+        "--case",
+        "motor/P1",
+        "--quiet",
+        "--out",
+        str(tmp_path),
+    ]
+    with pytest.raises(KeyboardInterrupt):
+        fixture_comparison.run(options_of(arguments))
+    assert compare_fixtures(arguments) == 0
+    assert len(made) == 8 and len(set(made)) == 7
+    rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
+    assert [row["larger_m"] for row in rows] == [0.0, 0.0, 1e-4, 3e-4, 0.0, 1e-4, 3e-4]
+    assert compare_fixtures([*arguments, "--seed", "3"]) == 2
+    assert "choose another --out" in capsys.readouterr().err
+
+
+def options_of(arguments: list[str]) -> ComparisonOptions:
+    return tyro.cli(ComparisonOptions, args=arguments)
+
+
+def test_larger_part_has_every_face_moved_outward() -> None:
+    mesh = load_product("motor_unit").parts["plate"].mesh
+    grown = larger(mesh, 3e-4)
+    np.testing.assert_allclose(grown.extents - mesh.extents, 3e-4, atol=1e-7)
+    assert grown.is_watertight
+    offset = (grown.volume - mesh.volume) / mesh.area
+    assert offset == pytest.approx(1.5e-4, rel=0.02)
+
+
+def test_postures_of_another_product_are_those_that_a_grasp_brings() -> None:
+    """The idler's post is gripped from above when upright; hanging upside down it is not."""
+    postures = {posture.label: posture for posture in postures_of(load_product("idler"))}
+    assert "post/+z" in postures
+    assert "post/-z" not in postures
+    for posture in postures.values():
+        R_JJaw = rotation_with_up(posture.up) @ posture.grasp.X_PJaw.rotation()
+        assert R_JJaw.matrix()[2, 2] < 0.05
+        assert abs(R_JJaw.matrix()[2, 0]) < 0.05

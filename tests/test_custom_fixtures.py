@@ -11,7 +11,7 @@ import pytest
 import trimesh
 from manifold3d import Manifold
 from pydrake.common.value import Value
-from pydrake.math import RigidTransform
+from pydrake.math import RigidTransform, RollPitchYaw
 from pydrake.multibody.math import SpatialForce
 from pydrake.systems.framework import Context
 from scipy.spatial import ConvexHull
@@ -20,7 +20,7 @@ from stories import free, small_product
 from cell import Cell, CellConfig, Product, Simulation, build_cell, load_product
 from cell.errors import UnknownName
 from cell.fixtures.base import FixtureError
-from cell.fixtures.custom.fixture import CustomFixture
+from cell.fixtures.custom.fixture import ON_SUPPORTS, CustomFixture
 from cell.fixtures.custom.nest import design_nest
 from cell.fixtures.custom.posts import design_posts
 from cell.fixtures.custom.walls import floors, slabs
@@ -242,6 +242,9 @@ def test_seated_part_is_held_sideways_and_let_go_upward(kind: str) -> None:
     distance, angle = error(cell, simulation.root)
     assert distance < 1e-4
     assert angle < 2e-3
+    context = cell.plant.GetMyContextFromRoot(simulation.root)
+    X_JP = fixture.pose(context).InvertAndCompose(cell.parts[PART].X_WP(context))
+    assert abs(fixture.off_supports(PART, X_JP)) < ON_SUPPORTS / 5
     weight = 9.81 * cell.parts[PART].part.mass
     for axis in "xy":  # Ten times what friction alone would bear.
         run(simulation, 150, {axis: 10 * 0.3 * weight})
@@ -252,6 +255,28 @@ def test_seated_part_is_held_sideways_and_let_go_upward(kind: str) -> None:
     assert error(cell, simulation.root)[0] > 2e-3
     free_and_release(cell, simulation.root)
     assert not fixture.holds(simulation.root, body)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_part_that_hangs_or_leans_is_off_its_supports(kind: str) -> None:
+    """By as much as it is raised, or as its farthest support is from the axis that it leans about.
+
+    What it is turned or shifted by on its supports does not count.
+    """
+    fixture = fixture_of(cell_with(kind))
+    seat = fixture.seat(PART)
+
+    def off(R: RollPitchYaw, p: tuple[float, float, float]) -> float:
+        """About the origin of J, below the mass centre."""
+        return fixture.off_supports(PART, RigidTransform(R, p) @ seat)
+
+    level = RollPitchYaw(0.0, 0.0, 0.0)
+    assert off(level, (0.0, 0.0, 3e-4)) == pytest.approx(3e-4)
+    assert off(RollPitchYaw(0.0, 0.0, 0.3), (1e-3, 2e-3, 0.0)) == pytest.approx(0.0, abs=1e-9)
+    farthest = max((fixture.X_JD @ (fixture.made.supports.T / MM))[1])
+    assert off(RollPitchYaw(0.02, 0.0, 0.0), (0.0, 0.0, 0.0)) == pytest.approx(
+        0.02 * farthest, rel=0.05
+    )
 
 
 def free_and_release(cell: Cell, root: Context) -> None:

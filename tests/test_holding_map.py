@@ -57,15 +57,15 @@ def patches(points, normals, areas, *, depth=0.0, limit=1e9, mu=MU) -> ContactSp
     normals = np.tile(normals, (count, 1)) if np.ndim(normals) == 1 else normals
     return ContactSprings(
         np.asarray(points, float), normals, areas * same, depth * same, STIFF * same, limit * same,
-        mu * same,
+        mu * same, np.arange(count), np.inf * same, np.zeros((count, 3)),
     )  # fmt: skip
 
 
-def floor(half: float = 0.015, count: int = 10) -> ContactSprings:
+def floor(half: float = 0.015, count: int = 10, **kinds) -> ContactSprings:
     """A square of 30 mm under a part, at z = 0."""
     axis = (np.arange(count) + 0.5) / count * 2 * half - half
     x, y = (own.ravel() for own in np.meshgrid(axis, axis))
-    return patches(np.column_stack([x, y, 0 * x]), Z, (2 * half / count) ** 2)
+    return patches(np.column_stack([x, y, 0 * x]), Z, (2 * half / count) ** 2, **kinds)
 
 
 def wall(x: float, height: float, **kinds) -> ContactSprings:
@@ -183,6 +183,37 @@ def test_the_map_turns_with_the_world():
     np.testing.assert_allclose(*loads, rtol=0.02)
 
 
+def test_patches_of_one_polygon_press_at_their_common_middle():
+    """[D] Two walls that press resist a turn by 14 N m/rad; as one polygon each, not at all.
+
+    Until they open at their ends, at 10 um / 9 mm = 1.1 mrad.
+    """
+    smooth = floor(mu=0.0)
+    walls = [wall(x, 0.010, depth=1e-5, mu=0.0) for x in (0.015, -0.015)]
+    whole = [replace(own, polygons=0 * own.polygons) for own in walls]
+    turned = [
+        borne(ContactSprings.together(smooth, *own), moment=Z, most=0.005).rotation[2]
+        for own in (walls, whole)
+    ]
+    assert turned[0] == pytest.approx(0.005 / 14.4, rel=0.2)
+    assert turned[1] > 1e-3
+
+
+def test_patch_counts_no_longer_beyond_an_edge_of_the_part():
+    """Lifted above a low wall, the part is pushed over it; a wall without an end would hold it."""
+    high = wall(0.015, 0.0004, mu=0.0)
+    low = replace(
+        high, bounds=high.points[:, 2] + 1e-6, bound_normals=np.tile(Z, (len(high.areas), 1))
+    )
+    push = np.array([0.0, 0.0, 0.0, 0.5, 0.0, 0.0])
+    moved = [
+        borne(ContactSprings.together(floor(mu=0.0), own), Z, steady=push).translation[0]
+        for own in (high, low)
+    ]
+    assert moved[0] < 2.5e-4
+    assert moved[1] > 2 * moved[0]
+
+
 def test_sphere_of_forces_is_even():
     forces = sphere_of_forces(30)[:, 3:]
     np.testing.assert_allclose(np.linalg.norm(forces, axis=1), 1.0)
@@ -246,8 +277,12 @@ def test_springs_push_as_drakes_contact_surface_does():
     steep = np.abs(normals[:, 2]) < 0.5
     strength = Strength(90e3, JIG.soil.friction_angle)
     springs = bed_springs(mesh, [hull], gradient, strength, 0.5)
-    depth = np.maximum(springs.depths + sink * springs.normals[:, 2], 0.0)
-    force = springs.stiffness * depth * springs.areas
+    sunk = replace(
+        springs,
+        depths=springs.depths + sink * springs.normals[:, 2],
+        bounds=springs.bounds + sink * springs.bound_normals[:, 2],
+    )
+    force = sunk.pressures * sunk.areas
     assert force[~springs.walls].sum() == pytest.approx((areas * pressures)[~steep].sum(), rel=0.03)
     assert force[springs.walls].sum() == pytest.approx((areas * pressures)[steep].sum(), rel=0.05)
     fewer = springs.merged(4e-3)
@@ -291,7 +326,7 @@ def test_the_jig_tells_what_holds_a_part():
     held = rig.jig.contacts(rig.context, rig.motor)
     assert held is not None
     springs = held.springs
-    up = springs.stiffness * np.maximum(springs.depths, 0.0) * springs.areas * springs.normals[:, 2]
+    up = springs.pressures * springs.areas * springs.normals[:, 2]
     assert up.sum() == pytest.approx(MASS * 9.81 + held.suction.forces.sum(), rel=0.1)
 
 

@@ -18,6 +18,7 @@ from planning.operations.log_rows import rows_between, rows_of
 from planning.operations.mating_measures import riders_standing, seat_errors
 from planning.operations.measures import force_plate_peaks, moved
 from planning.operations.operation import PhaseRecord, Step, StepRecord
+from planning.operations.pick_place import PICK_PLACE
 from planning.operations.placement import placement_errors
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.set_aside.measures import measure as measure_set_aside
@@ -212,6 +213,15 @@ def test_every_limit_is_checked_and_a_missing_quantity_fails() -> None:
     assert (failed.quantity, failed.value) == ("tilt_rad", None)
     (failed,) = insertion.failed_checks(limits | {"gap_m": float("nan")})
     assert failed.quantity == "gap_m"
+
+
+def test_limit_of_what_not_every_fixture_has_holds_where_it_was_measured() -> None:
+    placement = Step("place motor", PICK_PLACE, ("motor",))
+    kept = {limit.quantity: limit.limit for limit in PICK_PLACE.limits}
+    del kept["off_supports_m"]
+    assert not placement.failed_checks(kept)
+    (failed,) = placement.failed_checks(kept | {"off_supports_m": 2e-3})
+    assert failed.quantity == "off_supports_m"
 
 
 def test_limits_of_bolts_hold_for_each() -> None:

@@ -23,7 +23,7 @@ from experiments.paper.cases import Case, CaseResult, TrialResult, judged
 from experiments.paper.place_push import run_experiment
 from experiments.paper.postures import POSTURES, PUSHES
 from experiments.paper.trial import TrialRecord
-from experiments.paper.trial_metrics import force_peaks
+from experiments.paper.trial_metrics import force_peaks, place_fault
 
 
 def refused(arguments: list[str], tmp_path: Path, capsys: pytest.CaptureFixture) -> str:
@@ -78,6 +78,27 @@ def test_diverged_trial_can_be_written() -> None:
     result = judged(Case(POSTURES["motor/P2"]), trial)
     assert not result.success
     assert np.isfinite(list(result.measured.values())).all()
+
+
+@pytest.mark.parametrize(
+    ("raised", "aside", "said"),
+    [
+        (2e-3, 0.0, "wedged: it stands 2.00 mm off a support"),
+        (0.0, 6e-4, "it is 0.60 mm from its seat"),
+        (2e-5, 2e-4, ""),
+    ],
+)
+def test_placement_counts_on_a_fixture_of_its_own_only_if_seated(
+    raised: float, aside: float, said: str
+) -> None:
+    trial = TrialRecord(planned=RigidTransform(), seat=RigidTransform())
+    trial.placed, trial.off_supports = RigidTransform([aside, 0.0, raised]), raised
+    result = judged(Case(POSTURES["motor/P2"]), trial)
+    assert result.success == (not said)
+    assert said in place_fault(trial, result.measured)
+    # Wherever it was put counts on the soft jig.
+    trial.seat = trial.off_supports = None
+    assert judged(Case(POSTURES["motor/P2"]), trial).success
 
 
 def test_part_that_falls_over_is_a_failure_with_a_full_report(tmp_path: Path) -> None:

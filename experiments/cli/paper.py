@@ -13,7 +13,10 @@ from experiments.reporting.output import output_folder
 
 @dataclass(frozen=True)
 class Place:
-    """The paper's placement experiment: six postures, disturbed; upright and at rest counts."""
+    """The paper's placement experiment: six postures, disturbed; upright and at rest counts.
+
+    On a fixture that is made for the part it has to be seated as well.
+    """
 
     case: Annotated[str | None, arg(metavar="motor/P2")] = None
     """A posture, or a part for all of its postures. Default: all six."""

@@ -87,7 +87,7 @@ def write_case_report(
     result = summary(experiment, results)
     push = experiment.command == "push"
     failures = [
-        f"{result.case.label}, trial {k}: stopped in '{trial.failure[0]}': {trial.failure[1]}"
+        f"{result.case.label}, trial {k}: failed in '{trial.failure[0]}': {trial.failure[1]}"
         for result in results
         for k, trial in enumerate(result.trials)
         if trial.failure is not None

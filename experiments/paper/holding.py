@@ -16,17 +16,18 @@ from cell.bodies import full_name
 from cell.errors import RunFailure
 from cell.fixtures.soft_jig import SoftJig
 from cell.forces import applied_force
+from cell.vectors import cross
 from experiments.paper.rig.rig import Rig
 from experiments.paper.rig.rig_simulation import RigSimulation
-from planning.fixture_analysis.holding_map import ANGLE, WAY, Bearing
+from planning.fixture_analysis.holding_map import ANGLE, WAY, Bearing, depth_over_area
 
 RATE, MOST = 20.0, 40.0  # Of a force [N/s], [N]; faster ramps overstate holding by 1 to 2 N [M].
 TURN_RATE, TURN_MOST = 0.5, 1.5  # Of a moment [N m/s], [N m].
+AVERAGED = 5e-3  # Time over which an acceleration is taken, twice [s] [A].
 
 SIDEWAYS = tuple(f"force {way}" for way in ("+x", "-x", "+y", "-y"))  # In J.
 LIFT = "force +z"
 LOADS = (*SIDEWAYS, LIFT, "moment x", "moment y", "moment z")
-NOTHING = np.zeros((0, 3))
 
 
 @dataclass(frozen=True)
@@ -62,7 +63,9 @@ def holding(simulation: RigSimulation, loads: Sequence[str] = LOADS) -> Mapping[
 def pull(simulation: RigSimulation, direction: np.ndarray) -> Bearing:
     """Load a placed part with a slow ramp until it moves; the simulation is not changed.
 
-    Each pull starts from the same state, a copy of the simulation's.
+    Each pull starts from the same state, a copy of the simulation's. What is borne is the load less
+    what accelerates the part: a part of 70 g that nothing holds takes half a newton more at this
+    ramp before it has moved by 1 mm.
 
     Args:
         simulation: Of a rig whose hand has let go and is away.
@@ -94,7 +97,8 @@ def pull(simulation: RigSimulation, direction: np.ndarray) -> Bearing:
         if np.linalg.norm(rows[-1][4:7]) > WAY or np.linalg.norm(rows[-1][1:4]) > ANGLE:
             break
     table = np.array(rows)
-    return Bearing.of(table[:, 0], table[:, 1:7], watch.height(p_PG), table[:, 7], table[:, 8])
+    borne = watch.borne(table[:, 0], table[:, 1:7], direction, time_step)
+    return Bearing.of(borne, table[:, 1:7], watch.height(p_PG), table[:, 7], table[:, 8])
 
 
 class _Watch:
@@ -103,7 +107,38 @@ class _Watch:
     def __init__(self, rig: Rig, root: Context) -> None:
         self._rig, self._root, self._start = rig, root, _pose(rig, root)
         self._name = full_name(rig.part.body)
-        self._vertices, self._sealed = self._surface(), self._suction()
+        self._sealed = self._suction()
+        if isinstance(rig.fixture, SoftJig):
+            mesh = rig.fixture.memory(root).mesh
+            self._vertices, self._faces = mesh.vertices.copy(), mesh.boundary()
+            a, b, c = self._vertices[self._faces].transpose(1, 0, 2)
+            self._areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
+
+    def borne(
+        self, loads: np.ndarray, motion: np.ndarray, direction: np.ndarray, time_step: float
+    ) -> np.ndarray:
+        """Return the most that the fixture has borne of a ramp, up to each step (k,).
+
+        Args:
+            loads: (k,) applied, in multiples of the direction.
+            motion: (k, 6) rotation and translation of the part.
+            direction: (6,) of the load.
+            time_step: Between the rows [s].
+        """
+        part = self._rig.part.part
+        R = self._start.rotation().matrix()
+        turning = R @ (part.mesh.moment_inertia * part.mass / part.mesh.volume) @ R.T
+        inertia = (
+            direction[:3] @ turning @ direction[:3] + part.mass * direction[3:] @ direction[3:]
+        )
+        way, steps = motion @ direction, round(AVERAGED / time_step)
+        if len(way) <= 2 * steps:
+            return loads
+        second = way[2 * steps :] - 2 * way[steps:-steps] + way[: -2 * steps]
+        borne = loads.copy()
+        borne[steps:-steps] -= inertia * second / (steps * time_step) ** 2
+        borne[-steps:] = borne[-steps - 1]
+        return np.maximum.accumulate(np.clip(borne, 0.0, loads))
 
     def height(self, p_PG: np.ndarray) -> float:
         """Return the height of the mass centre over the lowest point of the part [m]."""
@@ -117,15 +152,17 @@ class _Watch:
         return np.concatenate([turn.angle() * turn.axis(), now @ p_PG - self._start @ p_PG])
 
     def bed(self) -> tuple[float, float]:
-        """Return how far the bed has given way for good [m], and the share of suction lost."""
-        moves = self._surface() - self._vertices
-        way = float(np.linalg.norm(moves, axis=1).max(initial=0.0))
-        return way, 1.0 - self._suction() / self._sealed if self._sealed else 0.0
+        """Return how far the bed has given way for good [m], and the share of suction lost.
 
-    def _surface(self) -> np.ndarray:
-        """Return the vertices (n, 3) of the bed [m]; none of a fixture that does not yield."""
+        The first by area, as the holding map has it; nothing of a fixture that does not yield.
+        """
         fixture = self._rig.fixture
-        return fixture.memory(self._root).mesh.vertices if isinstance(fixture, SoftJig) else NOTHING
+        if not isinstance(fixture, SoftJig):
+            return 0.0, 0.0
+        moves = np.linalg.norm(fixture.memory(self._root).mesh.vertices - self._vertices, axis=1)
+        depths = moves[self._faces].mean(axis=1)
+        way = float(depth_over_area(depths[None], self._areas)[0])
+        return way, 1.0 - self._suction() / self._sealed if self._sealed else 0.0
 
     def _suction(self) -> float:
         """Return the area that is still sealed [m2]."""

@@ -112,8 +112,9 @@ def _result(row: Row, out: Path) -> TrialResult:
     if row.done and log.exists():
         with np.load(log) as arrays:
             trial, _ = from_arrays(dict(arrays))
-    stopped = row.verdict != "success" and row.phase != CRITERION
-    failure = (row.phase or row.verdict, row.evidence) if stopped else None
+    # That a push has not moved the jig is its result; that a placement is none needs its reason.
+    told = row.verdict != "success" and not (row.experiment == "push" and row.phase == CRITERION)
+    failure = (row.phase or row.verdict, row.evidence) if told else None
     measured = {name: value for name, value in row.measured.items() if value is not None}
     return TrialResult(row.verdict == "success", measured, failure, trial)
 

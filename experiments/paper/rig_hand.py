@@ -11,6 +11,7 @@ from cell.configuration.config import CellConfig
 from cell.products.product import Grasp, Product
 from cell.simulation.phase import PhaseFailed
 from cell.simulation.state import State
+from experiments.paper.larger_part import larger
 from experiments.paper.postures import Posture
 from experiments.paper.rest import Rest
 from experiments.paper.rig.rig import HandPose, Rig, build_push_rig
@@ -58,10 +59,20 @@ class RigBench:
     posture: Posture
 
     @staticmethod
-    def build(config: CellConfig, product: Product, posture: Posture) -> RigBench:
-        """Build the rig for the part of a posture, with a fixture that takes it in this posture."""
+    def build(
+        config: CellConfig, product: Product, posture: Posture, growth: float = 0.0
+    ) -> RigBench:
+        """Build the rig for the part of a posture, with a fixture that takes it in this posture.
+
+        Args:
+            config: Of the cell.
+            product: With the part.
+            posture: In which it is placed.
+            growth: By which the part is larger than a fixture that is made for it knows [m].
+        """
         config, product = held(config, posture), gripped(product, posture)
-        return RigBench(build_push_rig(config, product, posture.part), posture)
+        surface = larger(product.parts[posture.part].mesh, growth) if growth else None
+        return RigBench(build_push_rig(config, product, posture.part, surface), posture)
 
     def begin(self, disturbance: TrialDisturbance) -> RigHand:
         """Set up a trial: the part on a stand over the jig, the open hand around it."""

@@ -148,6 +148,7 @@ class TrialRecord:
         seat: X_JP in which a fixture made for it holds the part; None for other fixtures.
         held: X_JP in the grasp when the bag has frozen.
         placed: X_JP after the hand has left.
+        off_supports: How far it then stands off the supports of such a fixture [m].
         speed: Of the part at that time [m/s].
         view: Of the camera above the jig; None if the trial was not run here.
         before, after: X_WJ of the jig before and after the push.
@@ -164,6 +165,7 @@ class TrialRecord:
     seat: RigidTransform | None = None
     held: RigidTransform | None = None
     placed: RigidTransform | None = None
+    off_supports: float | None = None
     speed: float = 0.0
     view: FixedView | None = None
     before: RigidTransform | None = None
@@ -216,7 +218,7 @@ def check_fits(config: CellConfig, product: Product, posture: Posture) -> None:
         FixtureError: A fixture cannot be made for it.
     """
     if work := fixture_work(held(config, posture), gripped(product, posture)):
-        cast(type[CustomFixture], fixture_class(config.workcell.fixture)).check(work)
+        cast(type[CustomFixture], fixture_class(config.workcell.fixture)).design(work)
         return
     part = product.parts[posture.part]
     R_WP = upright(posture.up, 0.0)
@@ -246,7 +248,8 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
         watch: Called at the events "placed", "before", "after" and "end".
     """
     observer, stage = hand.observer, hand.observer.stage
-    trial = TrialRecord(hand.planned, stage.fixture.seat(stage.part.part.name))
+    part, fixture = stage.part.part.name, stage.fixture
+    trial = TrialRecord(hand.planned, fixture.seat(part))
     trial.view = FixedView.above(observer.X_WJ, stage.config.camera)
     try:
         hand.press()
@@ -257,6 +260,7 @@ def run_trial(hand: Hand, push: PushSpec | None, watch: Watch = ignore) -> Trial
         else:
             hand.wait("settle", REST_TIME)
         trial.placed, trial.speed = observer.X_JP, observer.speed
+        trial.off_supports = fixture.off_supports(part, trial.placed)
         watch("placed", observer)
         if push is not None:
             _push(hand, push, trial, watch)

@@ -6,6 +6,7 @@ import numpy as np
 from pydrake.math import RigidTransform
 from scipy.ndimage import uniform_filter1d
 
+from cell.fixtures.custom.fixture import ON_SUPPORTS
 from experiments.paper.screws import seen_displacement
 from experiments.paper.trial import HOVER, TrialRecord
 from planning.operations.measures import angle_between
@@ -15,6 +16,9 @@ SUCCESS_DISTANCE = 0.063  # [m] [S] 90 % of the push.
 UPRIGHT = np.deg2rad(5.0)  # "Visually upright" [S], interpreted as this tilt [A].
 AT_REST = 1e-3  # [m/s] [A] a part that creeps faster is not at rest.
 SMOOTHING = 0.01  # [s] Averaging time of a typical force plate amplifier [A].
+# A part that its fixture is made for is seated if it stands on its supports, and this near to its
+# place [m] [D]: play is 0.1 to 0.3 mm, and a driver that is off by 0.4 misses a socket [M].
+SEATED = 4e-4
 VISIBLE = 0.2  # A peak below this fraction of the placing peak is not visible in a plot [A].
 
 
@@ -56,6 +60,8 @@ def measure_place(trial: TrialRecord) -> Measured:
             off = trial.placed.translation() - trial.seat.translation()
             measured["seat_error_m"] = float(np.linalg.norm(off))
             measured["seat_error_rad"] = angle_between(trial.seat, trial.placed)
+        if trial.off_supports is not None:
+            measured["off_supports_m"] = trial.off_supports
     if trial.held is not None and trial.placed is not None:
         shift = trial.placed.translation() - trial.held.translation()
         measured["release_shift_m"] = float(np.linalg.norm(shift))
@@ -108,10 +114,38 @@ def force_peaks(time: np.ndarray, force: np.ndarray, begun: float) -> int:
     return 1 + int(pushing.max() - rest >= VISIBLE * (placing.max() - rest))
 
 
-def place_succeeded(trial: TrialRecord, measured: Measured) -> bool:
+def stands(trial: TrialRecord, measured: Measured) -> bool:
     """Return whether the part is upright and at rest."""
     stood = trial.failure is None and trial.placed is not None
     return stood and measured["tilt_rad"] < UPRIGHT and measured["speed_m_per_s"] < AT_REST
+
+
+def place_fault(trial: TrialRecord, measured: Measured) -> str:
+    """Return why a placement is no success, in words; "" if it is one.
+
+    The part has to be upright and at rest, and on a fixture that is made for it also seated.
+    """
+    if trial.failure is not None or trial.placed is None:
+        return "it was not placed"
+    if not stands(trial, measured):
+        tilt, speed = measured["tilt_rad"], measured["speed_m_per_s"]
+        return (
+            f"it leans by {np.rad2deg(tilt):.1f} deg and moves at {1e3 * speed:.1f} mm/s, "
+            f"{np.rad2deg(UPRIGHT):g} deg and {1e3 * AT_REST:g} mm/s at most"
+        )
+    raised, error = measured.get("off_supports_m", 0.0), measured.get("seat_error_m", 0.0)
+    if not raised < ON_SUPPORTS:
+        return (
+            f"wedged: it stands {1e3 * raised:.2f} mm off a support, {1e3 * ON_SUPPORTS:g} at most"
+        )
+    if not error < SEATED:
+        return f"it is {1e3 * error:.2f} mm from its seat, {1e3 * SEATED:g} mm at most"
+    return ""
+
+
+def place_succeeded(trial: TrialRecord, measured: Measured) -> bool:
+    """Return whether the part is upright and at rest, and seated if its fixture has a seat."""
+    return not place_fault(trial, measured)
 
 
 def push_succeeded(measured: Measured) -> bool:

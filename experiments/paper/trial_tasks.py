@@ -24,6 +24,7 @@ from experiments.paper.trial import (
     ignore,
     run_trial,
 )
+from experiments.paper.trial_metrics import place_fault
 from experiments.reporting.output import write_arrays
 from experiments.reporting.render import View, take_picture
 from experiments.speed.calibration import Kernel
@@ -42,7 +43,7 @@ Arrays = dict[str, np.ndarray]
 def place(
     task: Task, *, case: str = "motor/P2", hand: str = "rig", number: int = 0, timed: bool = False
 ) -> Outcome:
-    """Place a part on the jig; success is upright and at rest.
+    """Place a part on the jig; success is upright and at rest, and seated where there is a seat.
 
     Args:
         task: Product, configuration, seed.
@@ -87,6 +88,8 @@ def _trial(command: str, task: Task, label: str, hand: str, number: int, timed: 
     phase, evidence = trial.failure or ("", "")
     if not result.success and trial.failure is None:
         phase, evidence = CRITERION, "it ran to its end, but not as the criterion of success asks"
+        if case.push is None:
+            evidence = place_fault(trial, result.measured)
     return Outcome(result.success, result.measured, phase, evidence)
 
 

@@ -12,6 +12,7 @@ from cell.products.product import Product
 from experiments.plan.arrangement import exploded, step_arrangement
 from experiments.plan.drawn import DrawnProduct
 from experiments.plan.heatmaps import contact_map, direction_maps
+from experiments.plan.holding_picture import holding_picture, load_table
 from experiments.plan.scene import SceneItem, figure, picture
 from experiments.reporting.html_page import page, pairs, section, table
 from experiments.reporting.output import write_text
@@ -114,6 +115,7 @@ def _steps(
     parts = [f"<p>{escape(READING)}</p>{scores if choices else ''}"]
     built = {line.name for line in plan.subassemblies}
     waiting, pictured = iter(choices), 0
+    fixed, up = set[str](), ""
     for line in plan.lines:
         parts.append(f"<h3>Sub-assembly {escape(line.name)}</h3>" if line.name in built else "")
         for number, (step, reason) in enumerate(zip(line.steps, step_texts(line), strict=True)):
@@ -127,6 +129,13 @@ def _steps(
                 f"{escape(reason.strip())}</p>"
             )
             parts.append(_choice(choice) if choice else "")
+            if choice and choice.judged:
+                chosen = choice.candidates[choice.paper]
+                # What stands on the fixture already is drawn where it was fixed.
+                if drawn and not (chosen.up == up and fixed <= set(chosen.body)):
+                    parts.append(holding_picture(drawn, chosen, choice.judged))
+                parts.append(load_table(choice.judged))
+                fixed, up = set(chosen.body), chosen.up
     if drawn and pictured == MOST_STEPS_PICTURED:
         parts.append(f"<p>The first {MOST_STEPS_PICTURED} steps are pictured.</p>")
     return "\n".join(parts) if plan.steps else ""

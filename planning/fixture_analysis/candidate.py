@@ -9,9 +9,11 @@ import numpy as np
 
 from cell.configuration.config import CellConfig
 from cell.errors import InputError
+from cell.fixtures import fixture_class
 from cell.fixtures.soft_jig import JigParameters
 from cell.machines.grippers import GRIPPER_MODELS
 from planning.feasibility.directions import axis_index, unit_vector
+from planning.fixture_analysis.held_body import HeldBody, LoadCase
 
 STEEP = 0.7071  # Sine of 45 degrees, rounded down: what comes at 45 degrees comes from above.
 LEVEL = 1e-3  # Sine of 0.06 degrees: horizontal within rounding.
@@ -40,6 +42,7 @@ class FixtureSetup:
         insertion_force: Largest force along an insertion [N].
         driver_force: Thrust of the screwdriver [N].
         gripper_stroke: Largest opening of the gripper, or of the widest one [m].
+        custom: The configuration, if its fixture is made for one part; None: the soft jig.
     """
 
     jig: JigParameters
@@ -47,6 +50,7 @@ class FixtureSetup:
     insertion_force: float
     driver_force: float
     gripper_stroke: float
+    custom: CellConfig | None = None
 
     @staticmethod
     def of(config: CellConfig) -> FixtureSetup:
@@ -66,6 +70,7 @@ class FixtureSetup:
             config.insertion.force_limit,
             config.driver.push_force,
             max(strokes),
+            config if fixture_class(config.workcell.fixture).custom else None,
         )
 
 
@@ -93,6 +98,11 @@ class Proposal:
     held: bool
     empty: bool
     slanted: Sequence[tuple[float, float, float]] = ()
+
+    @property
+    def key(self) -> tuple[tuple[str, ...], tuple[str, ...], str]:
+        """Body, moved parts and posture."""
+        return self.body, self.moved, self.up
 
     @property
     def sideways(self) -> list[str]:
@@ -165,6 +175,19 @@ class Candidate:
         return sum(self.scores.values()) / len(self.scores) if self.scores else 0.0
 
 
+@dataclass(frozen=True, eq=False)
+class Judged:
+    """What the holding map said of a candidate.
+
+    Attributes:
+        held: The body on its fixture.
+        cases: The loads of the step, with what is borne of each.
+    """
+
+    held: HeldBody
+    cases: tuple[LoadCase, ...]
+
+
 @dataclass(frozen=True)
 class Choice:
     """The general rule's ranking of the candidates of one step.
@@ -174,12 +197,14 @@ class Choice:
         candidates: Best first, the rejected ones last.
         paper: Index of Algorithm 1's choice among them.
         verdict: Whether both rules agree, in a sentence.
+        judged: What the holding map said of Algorithm 1's choice; None: it was not asked.
     """
 
     item: str
     candidates: tuple[Candidate, ...]
     paper: int
     verdict: str
+    judged: Judged | None = None
 
     @property
     def best(self) -> Candidate | None:

@@ -1,4 +1,4 @@
-"""Evaluation of one candidate at a time: the tests, cheapest first, then the scores."""
+"""Evaluation of one candidate on the soft jig: the tests, cheapest first, then the scores."""
 
 from __future__ import annotations
 
@@ -7,21 +7,17 @@ from functools import cached_property
 
 import numpy as np
 
-from cell.products.product import Product
 from cell.vectors import rotation_with_up
 from planning.feasibility.directions import axis_index, unit_vector
-from planning.feasibility.matrices import AssemblyMatrices
 from planning.feasibility.solids import combined_cog
-from planning.fixture_analysis.candidate import Candidate, FixtureSetup, Proposal
-from planning.fixture_analysis.footprint import USUAL_DEPTH, footprint, standing_points
-from planning.fixture_analysis.frozen_body import FrozenBody, HeldPart, frozen_body
-from planning.fixture_analysis.grip import GripAnalysis
-from planning.fixture_analysis.imprint import Imprint, PartSurface, depth_in_bed, press, samples_of
-from planning.fixture_analysis.loads import operation_load
+from planning.fixture_analysis.candidate import Judged, Proposal
+from planning.fixture_analysis.footprint import USUAL_DEPTH, Footprint, footprint, standing_points
+from planning.fixture_analysis.held_body import GRAVITY, HeldBody
+from planning.fixture_analysis.imprint import Imprint, depth_in_bed
+from planning.fixture_analysis.loads import OperationLoad, operation_load
 from planning.fixture_analysis.margins import Margin, margin_by_formula, margin_by_map
-from planning.fixture_analysis.support import SupportAnalysis
+from planning.fixture_analysis.shared_analysis import SharedAnalysis
 
-GRAVITY = 9.81  # [m/s2]
 BED_YIELDS = 0.001  # [m] [A] One bead: less overlap than that is within bed compliance and grid.
 MAX_EXCESS = 0.05  # [A] Share of the imprint's volume that the bed may fail to take up: less than
 # the change of its own packing.
@@ -31,99 +27,10 @@ class Rejected(Exception):
     """A candidate fails a test; the message says why."""
 
 
-class Evaluator:
-    """Evaluates candidates, and caches what several of them share."""
-
-    def __init__(self, product: Product, matrices: AssemblyMatrices, setup: FixtureSetup) -> None:
-        self.product, self.matrices, self.setup = product, matrices, setup
-        self.support = SupportAnalysis(product, matrices)
-        self.grip = GripAnalysis(product, matrices.solids, setup.gripper_stroke)
-        self._lows: dict[tuple[str, bytes], float] = {}
-        self._samples: dict[str, PartSurface] = {}
-        self._imprints: dict[tuple[tuple[str, ...], str, bytes], Imprint] = {}
-        self._held_parts: dict[str, HeldPart] = {}
-        self._frozen: dict[tuple[tuple[str, ...], str, bytes], FrozenBody] = {}
-
-    def evaluate(self, proposal: Proposal, *, mapped: bool = False) -> Candidate:
-        """Run the tests and return the candidate with figures, and scores or the reason.
-
-        Args:
-            proposal: What is to be held, and how.
-            mapped: Whether the holding map says what the body bears, not the formula.
-        """
-        evaluation = _Evaluation(self, proposal, mapped)
-        scores: dict[str, float] = {}
-        rejected = ""
-        try:
-            scores = evaluation.scores()
-        except Rejected as reason:
-            rejected = str(reason)
-        return Candidate(
-            proposal.name,
-            proposal.body,
-            proposal.moved,
-            proposal.up,
-            proposal.approach,
-            evaluation.figures,
-            scores,
-            rejected,
-            tuple(evaluation.notes),
-        )
-
-    def lowest(self, names: Sequence[str], R_JA: np.ndarray) -> float:
-        """Return the height of the lowest point of parts, turned [m]."""
-        key = R_JA.tobytes()
-        for name in (name for name in names if (name, key) not in self._lows):
-            vertices = self.matrices.solids[name].vertices
-            self._lows[name, key] = float((vertices @ R_JA[2]).min())
-        return min(self._lows[name, key] for name in names)
-
-    def surface(self, name: str) -> PartSurface:
-        """Return points on a part's surface."""
-        if name not in self._samples:
-            self._samples[name] = samples_of(self.matrices.solids[name])
-        return self._samples[name]
-
-    def imprint(
-        self, body: Sequence[str], up: str, R_JA: np.ndarray, p_middle: np.ndarray
-    ) -> Imprint:
-        """Return the imprint of a body; parts far above the bed do not change it."""
-        reach = self.lowest(body, R_JA) + self.setup.jig.bag.cap_height
-        reaching = tuple(name for name in body if self.lowest((name,), R_JA) <= reach)
-        key = reaching, up, p_middle.tobytes()
-        if key not in self._imprints:
-            parts = [self.surface(name) for name in reaching]
-            force = self.setup.press_force
-            self._imprints[key] = press(parts, R_JA, p_middle, self.setup.jig, force)
-        return self._imprints[key]
-
-    def frozen(
-        self, body: Sequence[str], up: str, R_JA: np.ndarray, p_middle: np.ndarray
-    ) -> FrozenBody:
-        """Return a body in the frozen bed; parts far above the bed do not touch it."""
-        reach = self.lowest(body, R_JA) + self.setup.jig.bag.cap_height
-        key = tuple(body), up, p_middle.tobytes()
-        if key not in self._frozen:
-            membrane, solids = self.setup.jig.jammed.friction, self.matrices.solids
-            for name in (name for name in body if name not in self._held_parts):
-                part = self.product.parts[name]
-                self._held_parts[name] = HeldPart.of(part, solids[name], membrane)
-            reaching = [n for n in body if self.lowest((n,), R_JA) <= reach]
-            self._frozen[key] = frozen_body(
-                [self._held_parts[name] for name in reaching],
-                [solids[name] for name in body],
-                R_JA,
-                p_middle,
-                self.setup.jig,
-                self.setup.press_force,
-            )
-        return self._frozen[key]
-
-
-class _Evaluation:
+class Evaluation:
     """One candidate under evaluation, with its figures and notes so far."""
 
-    def __init__(self, shared: Evaluator, proposal: Proposal, mapped: bool) -> None:
+    def __init__(self, shared: SharedAnalysis, proposal: Proposal, mapped: bool) -> None:
         self.shared, self.proposal, self.mapped = shared, proposal, mapped
         self.solids, self.setup = shared.matrices.solids, shared.setup
         self.R_JA = rotation_with_up(proposal.up).matrix()
@@ -149,17 +56,15 @@ class _Evaluation:
         Raises:
             Rejected: A test fails.
         """
-        approach = self.proposal.approach
-        if approach == "below":
-            raise Rejected("the moved parts would have to come from below, through the jig")
+        self._check_approach()
         self._check_connected()
         width = self._grip_width()
         diameter = self._footprint_diameter()
         self._check_balance()
         imprint = self._imprint()
         self._check_clearance(imprint)
-        tilt = self._tilt(imprint)
-        margin = self._holding_margin(imprint)
+        tilt = self._tilt(imprint.contact, -self.p_middle)
+        margin = self._holding_margin(self._margin(imprint))
         bag = self.setup.jig.bag
         return {
             "reach": (1.0 + max(0.0, self.proposal.rise)) / 2.0,
@@ -170,6 +75,10 @@ class _Evaluation:
             "gripper": max(0.0, 1.0 - width / self.setup.gripper_stroke),
             "continuity": float(self.proposal.held or self.proposal.empty),
         }
+
+    def _check_approach(self) -> None:
+        if self.proposal.approach == "below":
+            raise Rejected("the moved parts would have to come from below, through the jig")
 
     def _check_connected(self) -> None:
         support, body, moved = self.shared.support, self.proposal.body, self.proposal.moved
@@ -263,14 +172,18 @@ class _Evaluation:
         bolt, held = (self.solids[n].vertices @ axis for n in (name, screw.clamps))
         return float(min(bolt.max(), held.max()) - max(bolt.min(), held.min()))
 
-    def _tilt(self, imprint: Imprint) -> float:
-        """Return the angle of tilt at which the body, alone or combined, tips over [rad]."""
+    def _tilt(self, outline: Footprint | None, shift: np.ndarray) -> float:
+        """Return the angle of tilt at which the body, alone or combined, tips over [rad].
+
+        Args:
+            outline: Of what supports it; None: nothing does.
+            shift: (2,) from the turned product frame to the outline's [m].
+        """
         angles = []
         body, both = self.proposal.body, self.proposal.body + self.proposal.moved
         for names, what in ((body, "body"), (both, "both")):
             p_G = self.R_JA @ combined_cog(self.solids, names)
-            outline = imprint.contact
-            inside = -np.inf if outline is None else outline.margin(p_G[:2] - self.p_middle)
+            inside = -np.inf if outline is None else outline.margin(p_G[:2] + shift)
             self.figures[f"cog_height_{what}_m"] = float(p_G[2]) - self.low
             if inside <= 0.0:
                 of = "its centre of gravity" if what == "body" else "the common centre of gravity"
@@ -280,9 +193,8 @@ class _Evaluation:
         self.figures["lean_angle_rad"] = float(min(angles))
         return self.figures["lean_angle_rad"]
 
-    def _holding_margin(self, imprint: Imprint) -> float:
+    def _holding_margin(self, margin: Margin) -> float:
         """Return the sideways force that the body withstands, per force of the operation."""
-        margin = self._margin(imprint)
         load, capacity = margin.load, margin.across * margin.load.sideways
         self.figures |= {"bears_across_N": capacity, "pushed_across_N": load.sideways}
         across = (
@@ -292,7 +204,7 @@ class _Evaluation:
         if margin.turning < 1.0:
             # The hand that takes the torque has gripped the body, and takes a sideways force too.
             self.notes.append(
-                f"a counter-hold against {load.torque:.2f} N m is needed: the bed withstands "
+                f"a counter-hold against {load.torque:.2f} N m is needed: the fixture withstands "
                 f"{margin.turning * load.torque:.2f} N m"
                 + (f"; it {across}" if margin.across < 1.0 else "")
             )
@@ -305,12 +217,11 @@ class _Evaluation:
             )
         return margin.across
 
-    def _margin(self, imprint: Imprint) -> Margin:
-        """Return how often the body bears the loads, by the formula or by the map."""
-        body, shared = self.proposal.body, self.shared
-        loads = [
+    def _loads(self) -> list[OperationLoad]:
+        """Return the loads of the coming operation, of each piece that is brought."""
+        return [
             operation_load(
-                shared.product,
+                self.shared.product,
                 self.solids,
                 self.setup,
                 self.proposal,
@@ -318,14 +229,25 @@ class _Evaluation:
                 self.p_middle,
                 self.low,
             )
-            for piece in shared.support.components(self.proposal.moved)
+            for piece in self.shared.support.components(self.proposal.moved)
         ]
+
+    def _margin(self, imprint: Imprint) -> Margin:
+        """Return how often the body bears the loads, by the formula or by the map."""
+        body, shared = self.proposal.body, self.shared
         if self.mapped:
             held = shared.frozen(body, self.proposal.up, self.R_JA, self.p_middle)
-            return margin_by_map(held, np.array([0.0, 0.0, held.p_JA[2] + self.low]), loads)
+            return self._margin_on(held)
         p_G = (self.R_JA @ combined_cog(self.solids, body))[:2] - self.p_middle
         weight = GRAVITY * sum(self.solids[name].mass for name in body)
-        return margin_by_formula(imprint, self.setup.jig, weight, p_G, loads)
+        return margin_by_formula(imprint, self.setup.jig, weight, p_G, self._loads())
+
+    def _margin_on(self, held: HeldBody) -> Margin:
+        """Return how often the body, held by a fixture, bears the loads by the map."""
+        p_JMiddle = held.p_JA + [*self.p_middle, self.low]
+        margin = margin_by_map(held, p_JMiddle, self._loads())
+        self.shared.judged[self.proposal.key] = Judged(held, margin.cases)
+        return margin
 
 
 def _listed(names: Sequence[str]) -> str:

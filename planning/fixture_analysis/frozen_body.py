@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from cell.errors import InputError
-from cell.fixtures.contacts import Contacts
 from cell.fixtures.soft_jig import JigParameters, SurfaceSamples
 from cell.fixtures.soft_jig.bed_pieces import bed_pieces
 from cell.fixtures.soft_jig.frozen.contacts import frozen_contacts
@@ -23,9 +22,8 @@ from cell.fixtures.soft_jig.frozen.suction import Seal
 from cell.fixtures.soft_jig.frozen.yielding import Strength
 from cell.products.product import Part
 from planning.feasibility.solids import Solid, combined_cog
+from planning.fixture_analysis.held_body import GRAVITY, HeldBody
 from planning.fixture_analysis.imprint import PartSurface, pressed, samples_of
-
-GRAVITY = 9.81  # [m/s2]
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,25 +50,6 @@ class HeldPart:
         return HeldPart(samples_of(solid), hulls, pieces.friction, pieces.own)
 
 
-@dataclass(frozen=True, eq=False)
-class FrozenBody:
-    """A body that is held in the frozen bed.
-
-    Attributes:
-        contacts: That hold it, in J.
-        p_JG: (3,) centre of gravity [m].
-        weight: [N].
-        p_JA: (3,) place of the product frame; its rotation is the posture [m].
-        depth: Of the lowest point below the apex of the undisturbed bag [m].
-    """
-
-    contacts: Contacts
-    p_JG: np.ndarray
-    weight: float
-    p_JA: np.ndarray
-    depth: float
-
-
 def frozen_body(
     parts: Sequence[HeldPart],
     solids: Sequence[Solid],
@@ -79,7 +58,7 @@ def frozen_body(
     jig: JigParameters,
     press_force: float,
     vacuum: float | None = None,
-) -> FrozenBody:
+) -> HeldBody:
     """Press a body into the bed, freeze it, and return what holds the body.
 
     Args:
@@ -119,7 +98,7 @@ def frozen_body(
     )
     p_JG = R_JA @ combined_cog({solid.name: solid for solid in solids}, [s.name for s in solids])
     p_JG, weight = p_JG + sunk.p_JA, GRAVITY * sum(solid.mass for solid in solids)
-    return FrozenBody(contacts, p_JG, weight, sunk.p_JA, sunk.depth)
+    return HeldBody(contacts, p_JG, weight, sunk.p_JA)
 
 
 def _together(surfaces: Sequence[PartSurface]) -> SurfaceSamples:

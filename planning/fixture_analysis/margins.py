@@ -9,8 +9,7 @@ import numpy as np
 
 from cell.fixtures.soft_jig import JigParameters
 from planning.fixture_analysis.capacity import sideways_capacity, turning_capacity
-from planning.fixture_analysis.frozen_body import FrozenBody
-from planning.fixture_analysis.holding_map import holding_map
+from planning.fixture_analysis.held_body import HeldBody, LoadCase
 from planning.fixture_analysis.imprint import Imprint
 from planning.fixture_analysis.loads import OperationLoad
 
@@ -26,12 +25,14 @@ class Margin:
         turning: Multiple of the torque; infinite if there is none.
         load: With the smallest multiple across.
         criterion: Of the map, what fails first under it; "" by the formula.
+        cases: All loads that the map was asked for.
     """
 
     across: float
     turning: float
     load: OperationLoad
     criterion: str = ""
+    cases: tuple[LoadCase, ...] = ()
 
 
 def margin_by_formula(
@@ -57,38 +58,31 @@ def margin_by_formula(
     return Margin(across[worst], bears / load.torque if load.torque else np.inf, load)
 
 
-def margin_by_map(
-    body: FrozenBody, p_JMiddle: np.ndarray, loads: Sequence[OperationLoad]
-) -> Margin:
+def margin_by_map(body: HeldBody, p_JMiddle: np.ndarray, loads: Sequence[OperationLoad]) -> Margin:
     """Return the margin by the holding map: how often the body bears the whole of each load.
 
     Args:
-        body: In the frozen bed.
+        body: On its fixture.
         p_JMiddle: (3,) where the plane of the loads has its origin, at the body's lowest point [m].
         loads: Of the operation.
     """
-    down = [(load, np.array([0.0, 0.0, -load.down])) for load in loads]
-    pushes = [
-        (load, _wrench(body, p_JMiddle, load, force + [*(load.sideways * way), 0.0]))
-        for load, force in down
+    loaded = [
+        (load, np.array([*(load.sideways * way), -load.down]), 0.0)
+        for load in loads
         for way in load.directions
     ]
-    turns = [
-        _wrench(body, p_JMiddle, load, force) + np.array([0.0, 0.0, load.torque, 0.0, 0.0, 0.0])
-        for load, force in down[:1]
-        if load.torque
+    pushes = len(loaded)
+    loaded += [(o, np.array([0.0, 0.0, -o.down]), o.torque) for o in loads[:1] if o.torque]
+    points = [p_JMiddle + np.array([*load.p_Q, load.height]) for load, *_ in loaded]
+    wrenches = [
+        np.concatenate([np.cross(p_JQ - body.p_JG, force) + [0.0, 0.0, torque], force])
+        for p_JQ, (_, force, torque) in zip(points, loaded, strict=True)
     ]
-    wrenches = np.array([wrench for _, wrench in pushes] + turns)
-    found = holding_map(body.contacts, body.p_JG, body.weight, wrenches, most=MOST)
-    turning = found[-1].load if turns else np.inf
-    worst = int(np.argmin([bearing.load for bearing in found[: len(pushes)]]))
-    bearing = found[worst]
-    return Margin(bearing.load, turning, pushes[worst][0], bearing.criterion)
-
-
-def _wrench(
-    body: FrozenBody, p_JMiddle: np.ndarray, load: OperationLoad, force: np.ndarray
-) -> np.ndarray:
-    """Return the wrench (6,) about the centre of gravity of a force (3,) at a load's point."""
-    p_JQ = p_JMiddle + np.array([*load.p_Q, load.height])
-    return np.concatenate([np.cross(p_JQ - body.p_JG, force), force])
+    found = body.bears(np.array(wrenches), MOST)
+    cases = tuple(
+        LoadCase(force, torque, p_JQ, bearing)
+        for (_, force, torque), p_JQ, bearing in zip(loaded, points, found, strict=True)
+    )
+    turning = found[pushes].load if len(found) > pushes else np.inf
+    worst = int(np.argmin([bearing.load for bearing in found[:pushes]]))
+    return Margin(found[worst].load, turning, loaded[worst][0], found[worst].criterion, cases)

@@ -30,7 +30,7 @@ from planning.fixture_analysis.candidate import (
     FixtureSetup,
     Proposal,
 )
-from planning.fixture_analysis.evaluate import Evaluator
+from planning.fixture_analysis.evaluator import Evaluator
 
 
 def general_rule(
@@ -79,7 +79,9 @@ def _ranked(evaluator: Evaluator, step: FixingStep, assembled: tuple[str, ...]) 
     body = step.incoming if step.posture == opposite(step.up) else step.target
     ranked = _judged(evaluator, proposals, (body, step.up))
     paper = next(k for k, c in enumerate(ranked) if c.body == body and c.up == step.up)
-    return Choice(step.item, tuple(ranked), paper, _verdict(ranked, paper))
+    chosen = ranked[paper]
+    judged = evaluator.judged.get((chosen.body, chosen.moved, chosen.up))
+    return Choice(step.item, tuple(ranked), paper, _verdict(ranked, paper), judged)
 
 
 def _judged(
@@ -87,7 +89,8 @@ def _judged(
 ) -> list[Candidate]:
     """Return the candidates ranked, the best and Algorithm 1's choice judged by the holding map.
 
-    The formula ranks all of them first. What it puts first is judged by the map, which takes a
+    On fixtures that are made for a part the map has judged all of them. On the soft jig the formula
+    ranks them first. What it puts first is judged by the map, which takes a
     hundred times as long, until one that was judged stays first. Parts without a model, which no
     cell can hold, stay with the formula.
 
@@ -97,6 +100,8 @@ def _judged(
         chosen: Body and posture of Algorithm 1's choice.
     """
     found = {number: evaluator.evaluate(proposal) for number, proposal in enumerate(proposals)}
+    if evaluator.setup.custom is not None:
+        return sorted(found.values(), key=lambda one: (bool(one.rejected), -one.score))
     models = {name for name, part in evaluator.product.parts.items() if part.model is not None}
     formula = {
         number

@@ -18,12 +18,14 @@ class Limit:
         reason: Why this much.
         each: Whether it holds for every one of the step's "parts" or of the "riders" on them;
             "": it holds once.
+        optional: Whether it holds only if the quantity was measured: not every fixture has it.
     """
 
     quantity: str
     limit: float
     reason: str
     each: str = ""
+    optional: bool = False
 
     def names(self, parts: Mapping[str, Sequence[str]]) -> list[str]:
         """Return the measured names that it bounds, given a step's "parts" and "riders"."""
@@ -74,6 +76,8 @@ def failed_checks(
     failed = []
     for name, limit in limits.items():
         value = measured.get(name)
+        if value is None and limit.optional:
+            continue
         if value is None or not abs(value) <= limit.limit:
             failed.append(FailedCheck(name, value, limit.limit, limit.reason))
     return tuple(failed)

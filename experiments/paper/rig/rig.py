@@ -10,6 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+import trimesh
 from pydrake.math import RigidTransform, RotationMatrix
 from pydrake.multibody.plant import AddMultibodyPlant, MultibodyPlant
 from pydrake.multibody.tree import (
@@ -143,13 +144,16 @@ class Rig(Stage):
         self.part.joint.Unlock(self.plant.GetMyMutableContextFromRoot(root))
 
 
-def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
+def build_push_rig(
+    config: CellConfig, product: Product, part: str, surface: trimesh.Trimesh | None = None
+) -> Rig:
     """Build the rig for one part, with the fixture that the configuration names.
 
     Args:
         config: Of the cell; the base of the jig is free in any case.
         product: With the part.
         part: Name of the part.
+        surface: That a fixture made for the part meets; None: as it is drawn.
     """
     config = config.with_changes({"workcell.jig_base_fixed": False})
     builder = DiagramBuilder()
@@ -166,7 +170,7 @@ def build_push_rig(config: CellConfig, product: Product, part: str) -> Rig:
     kind = config.workcell.fixture
     work = fixture_work(config, alone, HAND_E)
     fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig, work)
-    fixture.add_part(plant, loose.body, loose.part.mesh)
+    fixture.add_part(plant, loose.body, loose.part.mesh if surface is None else surface)
     wrist, hand = _add_carriage(plant)
     gripper = Gripper.add(plant, hand, "gripper", HAND_E, jaws)
     palm = LowPalm.add(plant, scene_graph, hand, HAND_E, config.push.palm_height)

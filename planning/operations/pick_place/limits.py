@@ -2,6 +2,7 @@
 
 import numpy as np
 
+from cell.fixtures.custom.fixture import ON_SUPPORTS
 from planning.operations.limits import Limit
 
 LIMITS = (
@@ -12,5 +13,6 @@ LIMITS = (
     Limit("jam_kick_m_per_s", 0.02, "freezing must not kick"),
     Limit("release_kick_m", 3e-4, "the frozen bed carries the weight"),
     Limit("release_kick_m_per_s", 0.02, "opening the hand must not kick"),
+    Limit("off_supports_m", ON_SUPPORTS, "what hangs on a lead-in is wedged", optional=True),
     Limit("speed_after_1_s_m_per_s", 1e-3, "a part that creeps is not fixed"),
 )

@@ -30,6 +30,8 @@ def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:
         planned = planned_pose(cell, part, record.placement)
         measured |= placement_errors(planned, end.X_WP[part])
         measured["depth_m"] = _depth(cell, part, end)
+        if (raised := cell.fixture.off_supports(part, end.X_JP(part))) is not None:
+            measured["off_supports_m"] = raised
         measured["speed_after_1_s_m_per_s"] = float(np.linalg.norm(end.V_WP[part][3:]))
     return measured
 
