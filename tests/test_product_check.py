@@ -19,6 +19,7 @@ from cell.products.product import Grasp, Part, Product
 from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from experiments.product.random_drawing import draw
+from planning.assembly_plan.planner import plan
 from planning.product_check.check import plan_findings
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
@@ -90,7 +91,7 @@ def test_grasps_that_no_step_can_use_are_found(product: Product) -> None:
     turned = top.X_PJaw @ RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0, 0, 0])
     upside_down = replace(top, name="top_9", X_PJaw=turned)
     wrong = changed(product, "cover", grasps=(upside_down, *cover.grasps))
-    _, todo = plan_findings(wrong, None, CONFIG)
+    _, todo = plan_findings(wrong, plan(wrong, config=CONFIG))
     reached = reached_grasps(RunningCell(wrong, CONFIG, 0).station, todo)
     assert {grasp.name for grasp in reached["cover"]} == {g.name for g in cover.grasps}
     kept, (guess,) = within_reach(wrong, reached)
@@ -166,20 +167,23 @@ def test_a_part_without_grasps(product: Product) -> None:
 
 def test_a_step_that_no_operation_can_run_is_named(product: Product) -> None:
     joints = tuple(joint for joint in product.joints if not isinstance(joint, Rest))
-    found, todo = plan_findings(replace(product, joints=joints), None, CONFIG)
+    bare = replace(product, joints=joints)
+    found, todo = plan_findings(bare, plan(bare, config=CONFIG))
     assert todo == []
     assert "No operation brings 'cover' to block" in said(iter(found), Level.FAILS)
 
 
 def test_what_comes_from_the_side_is_named(product: Product) -> None:
     """The same parts lying on their side: all but the first would have to come from there."""
-    found, todo = plan_findings(replace(product, up="+y"), ("block", "cover", "screws"), CONFIG)
+    lying, order = replace(product, up="+y"), ("block", "cover", "screws")
+    found, todo = plan_findings(lying, plan(lying, order, config=CONFIG))
     assert todo == []
     assert "no operation comes from the side" in said(iter(found), Level.FAILS)
 
 
 def test_an_order_that_is_impossible_is_said(product: Product) -> None:
-    found, todo = plan_findings(product, ("block", "screws", "cover"), CONFIG)
+    order = ("block", "screws", "cover")
+    found, todo = plan_findings(product, plan(product, order, config=CONFIG))
     assert todo == []
     assert said(iter(found), Level.FAILS).startswith("fails    order:")
 

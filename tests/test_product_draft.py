@@ -36,7 +36,7 @@ from planning.operations.operation import NoOperation
 from planning.operations.sequence import steps
 from planning.product_draft.depth_maps import DepthMaps
 from planning.product_draft.draft import Draft, DraftOptions, draft_product
-from planning.product_draft.grasp_sampling import PAD_FRICTION, sample_grasps
+from planning.product_draft.grasp_sampling import ABOVE_GROUND, PAD_FRICTION, sample_grasps
 from planning.product_draft.hand_shape import HandShape, surface
 from planning.product_draft.joint_guesses import guess_fits, guess_screws
 from planning.product_draft.tray_layout import ScrewRow, lay_out
@@ -175,9 +175,7 @@ def test_faces_that_are_not_opposite_are_no_grip() -> None:
     stepped = box((0, -20, 0), (4, -10, 10)) + box((-4, 10, 0), (0, 20, 10))
     stepped += box((-1, -20, 0), (1, 20, 10))
     maps = DepthMaps.of(mesh(stepped), np.eye(3))
-    grip = maps.grip((-20 * MM, 20 * MM), (0.0, 10 * MM))
-    assert grip is not None
-    assert not grip.force_closed(PAD_FRICTION)
+    assert maps.grip((-20 * MM, 20 * MM), (0.0, 10 * MM)) is None
 
 
 @pytest.mark.parametrize("shape", [box((-10, -15, 0), (10, 15, 50)), cylinder(12.0, 0, 50)])
@@ -209,6 +207,18 @@ def test_grasps_are_force_closed_and_free_of_collision(shape) -> None:  # noqa: 
             obstacle = fcl.CollisionObject(other, fcl.Transform())
             request, result = fcl.CollisionRequest(), fcl.CollisionResult()
             assert not fcl.collide(hand, obstacle, request, result)
+
+
+def test_a_lid_is_gripped_above_the_box_that_its_lip_goes_into() -> None:
+    """Lid and box are flush: the jaws end between the lip's underside and the lid's."""
+    parts = meshes(box_with_lid())
+    found = sample_grasps(parts["lid"], 0.03, HAND, UP, [surface(parts["box"])])
+    assert found
+    for ranked in found:
+        jaw, X_PJaw = ranked.grasp.jaw, ranked.grasp.X_PJaw
+        face = HAND.faces[jaw]
+        end = X_PJaw.translation()[2] - face.middle[1] - face.size[1] / 2
+        assert 0.0 < end <= max(ABOVE_GROUND)
 
 
 def test_what_is_wider_than_the_jaws_has_no_grasp() -> None:

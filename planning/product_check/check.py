@@ -9,7 +9,7 @@ from cell.machines.arm import Unreachable
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 from planning.assembly_plan.explain import stop_text
-from planning.assembly_plan.planner import FixingPlan, plan
+from planning.assembly_plan.planner import FixingPlan
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.fixture_analysis.rule import general_rule
 from planning.motion.paths import NoPath
@@ -21,29 +21,24 @@ from planning.product_check.machine_limits import machine_findings
 from planning.product_check.standing_clear import clearance_findings
 
 
-def plan_findings(
-    product: Product, order: tuple[str, ...] | None, config: CellConfig
-) -> tuple[list[Finding], list[Step]]:
-    """Return findings on the plan, and the steps that carry it out; none if it cannot be."""
-    fixing = plan(product, order, config=config)
+def plan_findings(product: Product, fixing: FixingPlan) -> tuple[list[Finding], list[Step]]:
+    """Return findings on a plan, and the steps that carry it out; none if it cannot be."""
     if fixing.stop is not None or fixing.unplanned:
         reasons = [f"{item.name} {item.reason}" for item in fixing.unplanned]
         reasons += [stop_text(fixing)] if fixing.stop else []
         return [fails("order", "; ".join(reasons))], []
-    found = list(_fixture_findings(product, fixing, config))
     try:
         todo = steps(product, fixing)
     except NoOperation as error:
-        return [*found, fails("order", str(error))], []
+        return [fails("order", str(error))], []
     names = ", ".join(step.name for step in todo)
-    return [*found, good("order", f"every step has an operation: {names}")], todo
+    return [good("order", f"every step has an operation: {names}")], todo
 
 
-def _fixture_findings(
-    product: Product, fixing: FixingPlan, config: CellConfig
-) -> Iterator[Finding]:
-    """Yield what speaks against the postures of the plan: footprint, imprint, stability."""
-    assert fixing.matrices is not None
+def fixture_findings(product: Product, fixing: FixingPlan, config: CellConfig) -> Iterator[Finding]:
+    """Yield what speaks against the postures of a plan: footprint, imprint, stability."""
+    if fixing.stop is not None or fixing.unplanned or fixing.matrices is None:
+        return
     setup = FixtureSetup.of(config)
     said: set[str] = set()
     for choice, step in zip(
@@ -87,4 +82,4 @@ def simulated_findings(
     return [*found, *reach_findings(station, todo)]
 
 
-__all__ = ["machine_findings", "plan_findings", "simulated_findings"]
+__all__ = ["fixture_findings", "machine_findings", "plan_findings", "simulated_findings"]

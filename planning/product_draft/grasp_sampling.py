@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from heapq import heapify, heappop, heappush
 
 import fcl
 import numpy as np
@@ -15,13 +16,15 @@ import trimesh
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.products.product import Grasp
-from planning.product_draft.depth_maps import CELL, DepthMaps
+from planning.product_draft.depth_maps import DepthMaps
 from planning.product_draft.hand_shape import JAWS, HandShape, surface
 
 PAD_FRICTION = 0.5  # [D] 2 a b / (a + b) of the pads' 0.8 and of 0.36, machined metal.
 LEAST_AREA = 8e-6  # [A] Of contact [m2]; a nose on a head of 3 mm has 9.
 GOOD_AREA = 1.5e-4  # [A] More is no better [m2].
 STEP = 2.5e-3  # Between jaw places on a part [m].
+FACES = 0.95  # Cosine of 18 degrees: what looks along the approach.
+LEVELS, MOST_LEVELS = 5, 4  # [A] Undersides: digits to which heights are one [m], how many.
 SIDES_WANTED = 8  # [A] Closing directions, those with the most area.
 MARGIN, TIGHT = 1e-3, 2e-4  # [A] Kept from what stands around, open and closed [m].
 # [D] Of the end of a jaw over what the part stands on [m]: closed on a part that is smaller than
@@ -80,9 +83,8 @@ def sample_grasps(
     found: list[RankedGrasp] = []
     for R in _orientations(mesh, up, from_side):
         maps = DepthMaps.of(mesh, R)
-        candidates = sorted(_candidates(mesh, mass, hand, maps, R), key=lambda g: -g.score)
         kept = 0
-        for ranked in candidates:
+        for ranked in _best_first(list(_places(mesh, hand, maps, R)), mass, hand, maps, R):
             if kept == 2:
                 break
             if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around, tight):
@@ -121,41 +123,102 @@ def _closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarra
     return [np.cos(t) * side + np.sin(t) * across for t in turns]
 
 
-def _candidates(
-    mesh: trimesh.Trimesh, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+@dataclass(frozen=True)
+class _Place:
+    """Where a jaw may grip: which, where the middle of its face is [m], how good that is at best.
+
+    Attributes:
+        jaw: Its name.
+        y, z: Of the middle of its face, along the jaw's axes [m].
+        lever: Distance of the mass centre from it along y [m].
+        bound: Score of a grasp there with as much contact as counts.
+    """
+
+    jaw: str
+    y: float
+    z: float
+    lever: float
+    bound: float
+
+
+def _best_first(
+    places: Sequence[_Place], mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
 ) -> Iterator[RankedGrasp]:
-    """Yield the grasps with jaws along R that hold a part, whatever else is around."""
+    """Yield the grasps with jaws along R that hold a part, whatever else is around, best first.
+
+    A place is looked at only when no grasp that is known is better than it can be.
+    """
+    found: dict[int, RankedGrasp] = {}
+    queue = [(-place.bound, False, number) for number, place in enumerate(places)]
+    heapify(queue)
+    while queue:
+        _, is_found, number = heappop(queue)
+        if is_found:
+            yield found.pop(number)
+            continue
+        ranked = _grasp_at(places[number], mass, hand, maps, R)
+        if ranked is not None:
+            found[number] = ranked
+            heappush(queue, (-ranked.score, True, number))
+
+
+def _places(
+    mesh: trimesh.Trimesh, hand: HandShape, maps: DepthMaps, R: np.ndarray
+) -> Iterator[_Place]:
+    """Yield the places of all jaws along R."""
     p_Com = mesh.center_mass @ R
     setback = 1e-3
+    undersides = _undersides(mesh, R[:, 2])
     for jaw in JAWS:
-        face, (least, most) = hand.faces[jaw], hand.widths(jaw)
-        half_y, half_z = face.size[0] / 2.0, face.size[1] / 2.0
-        ys = _places(maps.y, p_Com[1], half_y)
-        # Besides, with the end of the jaw just beyond what the part stands on.
-        ends = maps.z[-1] + CELL / 2.0 - half_z - np.array(ABOVE_GROUND)
-        zs = [*_places(maps.z, p_Com[2], half_z - setback), *ends]
-        for y in ys:
+        half_y, half_z = (size / 2.0 for size in hand.faces[jaw].size)
+        # Besides, with the end of the jaw just above what the part may stand on.
+        ends = np.subtract.outer(undersides - half_z, ABOVE_GROUND).ravel()
+        zs = [*_steps(maps.z, p_Com[2], half_z - setback), *ends]
+        for y in _steps(maps.y, p_Com[1], half_y):
+            lever = abs(y - p_Com[1])
             for z in zs:
-                grip = maps.grip((y - half_y, y + half_y), (z - half_z, z + half_z))
-                if (
-                    grip is None
-                    or not least <= grip.width <= most - 1e-3
-                    or grip.area < LEAST_AREA
-                    or not grip.force_closed(PAD_FRICTION)
-                ):
-                    continue
-                lever = abs(y - p_Com[1])
-                force = _force(mass, lever, grip.spread)
-                if force > LARGEST_FORCE:
-                    continue
-                score = min(grip.area / GOOD_AREA, 1.0) - 30.0 * lever - 5.0 * abs(z - p_Com[2])
-                p_PJaw = R @ [grip.middle, y - face.middle[0], z - face.middle[1]]
-                X_PJaw = RigidTransform(RotationMatrix(R), p_PJaw)
-                grasp = Grasp("", jaw, X_PJaw, grip.width, force)
-                yield RankedGrasp(grasp, score, grip.area, lever)
+                bound = 1.0 - 30.0 * lever - 5.0 * abs(z - p_Com[2])
+                yield _Place(jaw, float(y), float(z), float(lever), float(bound))
 
 
-def _places(grid: np.ndarray, middle: float, half: float) -> np.ndarray:
+def _undersides(mesh: trimesh.Trimesh, approach: np.ndarray) -> np.ndarray:
+    """Return how far along the approach faces look that way, (n,), the part's end among them [m].
+
+    A lid stands on its rim, and not on the lip below it.
+    """
+    ahead = mesh.face_normals @ approach > FACES
+    depths = np.append(mesh.triangles_center[ahead], mesh.vertices, axis=0) @ approach
+    levels = np.round(depths[: ahead.sum()], LEVELS)
+    area = {level: float(mesh.area_faces[ahead][levels == level].sum()) for level in set(levels)}
+    wide = sorted(area, key=lambda level: (-area[level], level))[:MOST_LEVELS]
+    return np.unique([*wide, round(float(depths.max()), LEVELS)])
+
+
+def _grasp_at(
+    place: _Place, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+) -> RankedGrasp | None:
+    """Return the grasp at a place, if it holds a part of a mass [kg]."""
+    face, (least, most) = hand.faces[place.jaw], hand.widths(place.jaw)
+    half_y, half_z = face.size[0] / 2.0, face.size[1] / 2.0
+    y, z = place.y, place.z
+    grip = maps.grip((y - half_y, y + half_y), (z - half_z, z + half_z))
+    if (
+        grip is None
+        or not least <= grip.width <= most - 1e-3
+        or grip.area < LEAST_AREA
+        or not grip.force_closed(PAD_FRICTION)
+    ):
+        return None
+    force = _force(mass, place.lever, grip.spread)
+    if force > LARGEST_FORCE:
+        return None
+    p_PJaw = R @ [grip.middle, y - face.middle[0], z - face.middle[1]]
+    grasp = Grasp("", place.jaw, RigidTransform(RotationMatrix(R), p_PJaw), grip.width, force)
+    score = place.bound - 1.0 + min(grip.area / GOOD_AREA, 1.0)
+    return RankedGrasp(grasp, score, grip.area, place.lever)
+
+
+def _steps(grid: np.ndarray, middle: float, half: float) -> np.ndarray:
     """Return the places of a face that meets a part, from the middle outwards."""
     low, high = grid[0] - half + STEP, grid[-1] + half - STEP
     steps = np.arange(np.ceil((low - middle) / STEP), np.floor((high - middle) / STEP) + 1)
