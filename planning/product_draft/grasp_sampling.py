@@ -97,7 +97,7 @@ def sample_grasps(
 
 def _orientations(mesh: trimesh.Trimesh, up: np.ndarray, from_side: bool) -> Iterator[np.ndarray]:
     """Yield the axes of jaws, (3, 3) columns closing, lateral, approach."""
-    for closing in _closing_directions(mesh, up):
+    for closing in closing_directions(mesh, up):
         if not from_side:
             yield np.column_stack([closing, np.cross(-up, closing), -up])
             continue
@@ -108,7 +108,7 @@ def _orientations(mesh: trimesh.Trimesh, up: np.ndarray, from_side: bool) -> Ite
                 yield np.column_stack([closing, np.cross(z, closing), z])
 
 
-def _closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarray]:
+def closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarray]:
     """Return horizontal directions along which there is most surface to grip, both ways each."""
     level = np.abs(mesh.face_normals @ up) < 0.05
     if not level.any():
