@@ -20,7 +20,7 @@ from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from experiments.product.random_drawing import draw
 from planning.assembly_plan.planner import plan
-from planning.product_check.check import plan_findings
+from planning.product_check.check import plan_findings, reach_findings
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
 from planning.product_check.reach import reached_grasps
@@ -163,6 +163,27 @@ def test_a_part_without_grasps(product: Product) -> None:
     assert "it has no grasp" in said(
         machine_findings(changed(product, "cover", grasps=()), CONFIG), Level.FAILS
     )
+
+
+def test_a_part_without_grasps_that_is_too_wide(product: Product) -> None:
+    corners = product.parts["cover"].mesh.copy().apply_scale(1.5)
+    wide = changed(product, "cover", grasps=(), mesh=corners)
+    found = said(machine_findings(wide, CONFIG), Level.FAILS)
+    assert "it is 60 mm across, and hand_e opens 50 mm" in found
+    assert "gripper_85 opens wider" in found
+
+
+def test_a_part_that_is_gripped_from_the_side_only_is_named(product: Product) -> None:
+    """Such a grasp holds it while it is screwed down: it cannot be brought with it."""
+    cover = product.parts["cover"]
+    side = tuple(grasp for grasp in cover.grasps if grasp.name.startswith("side"))
+    assert side
+    only = changed(product, "cover", grasps=side)
+    _, todo = plan_findings(only, plan(only, config=CONFIG))
+    station = RunningCell(only, CONFIG, 0).station
+    found = said(reach_findings(station, todo), Level.FAILS)
+    assert "rest cover" in found
+    assert "part 'cover' has no grasp from above" in found
 
 
 def test_a_step_that_no_operation_can_run_is_named(product: Product) -> None:

@@ -17,6 +17,7 @@ from drawn_products import (
     screw,
     write_meshes,
 )
+from manifold3d import Manifold
 from pydrake.geometry import Box
 
 from cell.cad.motor_unit import mesh
@@ -39,6 +40,7 @@ from planning.product_draft.draft import Draft, DraftOptions, draft_product
 from planning.product_draft.grasp_sampling import ABOVE_GROUND, PAD_FRICTION, sample_grasps
 from planning.product_draft.hand_shape import HandShape, surface
 from planning.product_draft.joint_guesses import guess_fits, guess_screws
+from planning.product_draft.no_grasp import why_no_grasp
 from planning.product_draft.tray_layout import ScrewRow, lay_out
 
 MM = 1e-3
@@ -221,8 +223,22 @@ def test_a_lid_is_gripped_above_the_box_that_its_lip_goes_into() -> None:
         assert 0.0 < end <= max(ABOVE_GROUND)
 
 
-def test_what_is_wider_than_the_jaws_has_no_grasp() -> None:
-    assert sample_grasps(mesh(box((-50, -50, 0), (50, 50, 50))), 0.1, HAND, UP, []) == []
+def test_why_a_part_has_no_grasp_is_said() -> None:
+    """Too wide; flush in a pocket; or round all over."""
+    wide = mesh(box((-40, -50, 0), (40, 50, 20)))
+    said = "80 mm across, and hand_e opens 50 mm; as the tool of its arm, gripper_85 opens wider"
+    assert said in why_no_grasp(wide, 0.1, HAND, UP, {})
+    plate = mesh(box((-20, -16, 0), (20, 16, 5)))
+    frame = box((-30, -26, -5), (30, 26, 5)) - box((-20.2, -16.2, 0), (20.2, 16.2, 6))
+    around = {
+        "its nest": surface(mesh(box((-60, -60, -70), (60, 60, -60)))),
+        "'frame'": surface(mesh(frame)),
+    }
+    assert sample_grasps(plate, 0.01, HAND, UP, [*around.values()]) == []
+    why = why_no_grasp(plate, 0.01, HAND, UP, around)
+    assert why == "'frame' alone would leave the jaws no room"
+    ball = mesh(Manifold.sphere(10.0, 24))
+    assert "no two opposite faces" in why_no_grasp(ball, 0.01, HAND, UP, {})
 
 
 # Tray.
