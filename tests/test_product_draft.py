@@ -223,6 +223,23 @@ def test_a_lid_is_gripped_above_the_box_that_its_lip_goes_into() -> None:
         assert 0.0 < end <= max(ABOVE_GROUND)
 
 
+def test_a_grip_squeezes_its_pads_by_half_a_millimetre_at_most() -> None:
+    """Noses that meet little of a thin plate press with less than on a thick one."""
+    assert HAND.stiffness("nose") == pytest.approx(1e7 / 1e-3)
+    block = surface(mesh(box((-20, -16, -30), (20, 16, 0))))
+
+    def forces(thickness: float) -> set[float]:
+        plate = mesh(box((-20, -16, 0), (20, 16, thickness)))
+        found = sample_grasps(plate, 0.03, HAND, UP, [block])
+        for ranked in found:
+            most = 5e-4 * HAND.stiffness(ranked.grasp.jaw) * ranked.area
+            assert ranked.grasp.force < most + 1.0
+        return {ranked.grasp.force for ranked in found}
+
+    assert forces(10.0) == {40.0}
+    assert min(forces(2.5)) < 40.0
+
+
 def test_why_a_part_has_no_grasp_is_said() -> None:
     """Too wide; flush in a pocket; or round all over."""
     wide = mesh(box((-40, -50, 0), (40, 50, 20)))
