@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import bar_puzzle, bearing_block, covered_block, write_meshes
+from drawn_products import bar_puzzle, bearing_block, box_with_lid, covered_block, write_meshes
 from manifold3d import Manifold
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -229,6 +229,11 @@ def own_product(drawn: Mapping[str, Manifold], folder: Path) -> str:
 @pytest.mark.slow
 def test_a_bush_a_cover_over_it_and_four_screws_pass(tmp_path: Path) -> None:
     assert main(["check", own_product(bearing_block(), tmp_path), "--quiet"]) == 0
+
+
+@pytest.mark.slow
+def test_a_box_with_a_lip_in_its_lid_and_cross_head_screws_passes(tmp_path: Path) -> None:
+    assert main(["check", own_product(box_with_lid(), tmp_path), "--quiet"]) == 0
 
 
 @pytest.mark.slow

@@ -21,6 +21,7 @@ from planning.product_draft.hand_shape import JAWS, HandShape, surface
 
 PAD_FRICTION = 0.5  # [D] 2 a b / (a + b) of the pads' 0.8 and of 0.36, machined metal.
 LEAST_AREA = 5e-6  # [D] Of contact [m2]: a nose on the head of an M3 cap screw has 4.4.
+HOLD_AREA = 1e-5  # [A] At least, against a driver: noses slid off 6 mm2, and held by 16 [M] [m2].
 GOOD_AREA = 1.5e-4  # [A] More is no better [m2].
 STEP = 2.5e-3  # Between jaw places on a part [m].
 FACES = 0.95  # Cosine of 18 degrees: what looks along the approach.
@@ -38,8 +39,7 @@ FAR_APART = 4e-3  # [A] Grasps that are nearer count as one [m].
 LARGEST_FORCE, LEAST_FORCE = 65.0, 5.0  # [R] Of 130 N for both pads; [A] a screw's.
 GRAVITY = 9.81
 LIFT_FACTOR = 10.0  # [A] Grip over the weight that friction just bears: an arm brakes.
-# [D] Of a pad by the grip [m]: jaws that close 1.5 mm further than expected have lost the part, and
-# 40 N on 6 mm2 of the noses closed them by 1.6 [M].
+# [A] Of a pad by the grip [m]: jaws that close 1.5 mm further than expected have lost the part.
 SQUEEZED = 5e-4
 USUAL_FORCE, LIGHT = 40.0, 5e-3  # [A] As of the products drawn by hand [N]; lighter: less [kg].
 
@@ -88,6 +88,8 @@ def sample_grasps(
         maps = DepthMaps.of(mesh, R)
         kept = 0
         for ranked in _best_first(list(_places(mesh, hand, maps, R)), mass, hand, maps, R):
+            if from_side and ranked.area < HOLD_AREA:
+                continue
             if kept == 2:
                 break
             if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around, tight):
