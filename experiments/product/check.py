@@ -12,6 +12,8 @@ from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
 from planning.assembly_plan.planner import plan
 from planning.product_check.check import (
+    borne_torques,
+    fixture_choices,
     fixture_findings,
     machine_findings,
     plan_findings,
@@ -54,6 +56,8 @@ def find(
     found = list(machine_findings(product, config))
     fixing = plan(product, order, config=config)
     planned, todo = plan_findings(product, fixing)
-    found += [*fixture_findings(product, fixing, config), *planned]
+    choices = fixture_choices(product, fixing, config)
+    found += [*fixture_findings(fixing, choices), *planned]
     running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
-    return [*found, *simulated_findings(running.simulation, running.station, todo)]
+    borne = borne_torques(fixing, choices)
+    return [*found, *simulated_findings(running.simulation, running.station, todo, borne)]
