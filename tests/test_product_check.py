@@ -20,7 +20,13 @@ from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from experiments.product.random_drawing import draw
 from planning.assembly_plan.planner import plan
-from planning.product_check.check import plan_findings, reach_findings
+from planning.product_check.check import (
+    borne_torques,
+    fixture_choices,
+    fixture_findings,
+    plan_findings,
+    reach_findings,
+)
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
 from planning.product_check.reach import reached_grasps
@@ -184,6 +190,27 @@ def test_a_part_that_is_gripped_from_the_side_only_is_named(product: Product) ->
     found = said(reach_findings(station, todo), Level.FAILS)
     assert "rest cover" in found
     assert "part 'cover' has no grasp from above" in found
+
+
+@pytest.mark.parametrize(("borne", "level"), [(0.3, Level.FAILS), (0.9, Level.DOUBTFUL)])
+def test_a_torque_that_nothing_bears_is_said(product: Product, borne: float, level: Level) -> None:
+    """No grasp from the side: the jig alone holds against the driver."""
+    top = tuple(g for g in product.parts["cover"].grasps if g.name.startswith("top"))
+    bare = changed(product, "cover", grasps=top)
+    _, todo = plan_findings(bare, plan(bare, config=CONFIG))
+    station = RunningCell(bare, CONFIG, 0).station
+    found = said(reach_findings(station, todo, dict.fromkeys(bare.screws, borne)), level)
+    assert "tighten bolts: no grasp of 'cover' from the side leaves room" in found
+    assert ("0.3 of 0.5 N m" in found) == (level is Level.FAILS)
+
+
+def test_what_the_jig_bears_of_a_torque_is_known(product: Product) -> None:
+    fixing = plan(product, config=CONFIG)
+    choices = fixture_choices(product, fixing, CONFIG)
+    borne = borne_torques(fixing, choices)
+    assert set(borne) == set(product.screws)
+    assert all(0.05 < torque < 5.0 for torque in borne.values())
+    assert said(fixture_findings(fixing, choices), Level.FAILS) == ""
 
 
 def test_a_step_that_no_operation_can_run_is_named(product: Product) -> None:
