@@ -57,8 +57,9 @@ def _grasps(part: Part, gripper: GripperModel, up: str) -> Iterator[Finding]:
     if not part.grasps:
         R_UpP = rotation_with_up(up) @ part.X_AP.rotation()
         outline = footprint((part.mesh.vertices @ R_UpP.matrix().T)[:, :2])
-        wide = outline is not None and outline.narrowest > gripper.stroke
-        reason = too_wide(gripper, outline.narrowest) if wide else "give it one in the product file"
+        width = 0.0 if outline is None else outline.narrowest
+        given = "give it one in the product file"
+        reason = too_wide(gripper, width) if width > gripper.stroke else given
         yield fails(part.name, f"it has no grasp; {reason}")
         return
     usable = 0
