@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import bar_puzzle, bearing_block, covered_block, write_meshes
+from drawn_products import bar_puzzle, bearing_block, box_with_lid, covered_block, write_meshes
 from manifold3d import Manifold
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -19,7 +19,14 @@ from cell.products.product import Grasp, Part, Product
 from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from experiments.product.random_drawing import draw
-from planning.product_check.check import plan_findings
+from planning.assembly_plan.planner import plan
+from planning.product_check.check import (
+    borne_torques,
+    fixture_choices,
+    fixture_findings,
+    plan_findings,
+    reach_findings,
+)
 from planning.product_check.finding import Level
 from planning.product_check.machine_limits import machine_findings
 from planning.product_check.reach import reached_grasps
@@ -90,7 +97,7 @@ def test_grasps_that_no_step_can_use_are_found(product: Product) -> None:
     turned = top.X_PJaw @ RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0, 0, 0])
     upside_down = replace(top, name="top_9", X_PJaw=turned)
     wrong = changed(product, "cover", grasps=(upside_down, *cover.grasps))
-    _, todo = plan_findings(wrong, None, CONFIG)
+    _, todo = plan_findings(wrong, plan(wrong, config=CONFIG))
     reached = reached_grasps(RunningCell(wrong, CONFIG, 0).station, todo)
     assert {grasp.name for grasp in reached["cover"]} == {g.name for g in cover.grasps}
     kept, (guess,) = within_reach(wrong, reached)
@@ -164,22 +171,67 @@ def test_a_part_without_grasps(product: Product) -> None:
     )
 
 
+def test_a_part_without_grasps_that_is_too_wide(product: Product) -> None:
+    corners = product.parts["cover"].mesh.copy().apply_scale(1.5)
+    wide = changed(product, "cover", grasps=(), mesh=corners)
+    found = said(machine_findings(wide, CONFIG), Level.FAILS)
+    assert "it is 60 mm across, and hand_e opens 50 mm" in found
+    assert "gripper_85 opens wider" in found
+
+
+def test_a_part_that_is_gripped_from_the_side_only_is_named(product: Product) -> None:
+    """Such a grasp holds it while it is screwed down: it cannot be brought with it."""
+    cover = product.parts["cover"]
+    side = tuple(grasp for grasp in cover.grasps if grasp.name.startswith("side"))
+    assert side
+    only = changed(product, "cover", grasps=side)
+    _, todo = plan_findings(only, plan(only, config=CONFIG))
+    station = RunningCell(only, CONFIG, 0).station
+    found = said(reach_findings(station, todo), Level.FAILS)
+    assert "rest cover" in found
+    assert "part 'cover' has no grasp from above" in found
+
+
+@pytest.mark.parametrize(("borne", "level"), [(0.3, Level.FAILS), (0.9, Level.DOUBTFUL)])
+def test_a_torque_that_nothing_bears_is_said(product: Product, borne: float, level: Level) -> None:
+    """No grasp from the side: the jig alone holds against the driver."""
+    top = tuple(g for g in product.parts["cover"].grasps if g.name.startswith("top"))
+    bare = changed(product, "cover", grasps=top)
+    _, todo = plan_findings(bare, plan(bare, config=CONFIG))
+    station = RunningCell(bare, CONFIG, 0).station
+    found = said(reach_findings(station, todo, dict.fromkeys(bare.screws, borne)), level)
+    assert "tighten bolts: no grasp of 'cover' from the side leaves room" in found
+    assert ("0.3 of 0.5 N m" in found) == (level is Level.FAILS)
+
+
+def test_what_the_jig_bears_of_a_torque_is_known(product: Product) -> None:
+    fixing = plan(product, config=CONFIG)
+    choices = fixture_choices(product, fixing, CONFIG)
+    borne = borne_torques(fixing, choices)
+    assert set(borne) == set(product.screws)
+    assert all(0.05 < torque < 5.0 for torque in borne.values())
+    assert said(fixture_findings(fixing, choices), Level.FAILS) == ""
+
+
 def test_a_step_that_no_operation_can_run_is_named(product: Product) -> None:
     joints = tuple(joint for joint in product.joints if not isinstance(joint, Rest))
-    found, todo = plan_findings(replace(product, joints=joints), None, CONFIG)
+    bare = replace(product, joints=joints)
+    found, todo = plan_findings(bare, plan(bare, config=CONFIG))
     assert todo == []
     assert "No operation brings 'cover' to block" in said(iter(found), Level.FAILS)
 
 
 def test_what_comes_from_the_side_is_named(product: Product) -> None:
     """The same parts lying on their side: all but the first would have to come from there."""
-    found, todo = plan_findings(replace(product, up="+y"), ("block", "cover", "screws"), CONFIG)
+    lying, order = replace(product, up="+y"), ("block", "cover", "screws")
+    found, todo = plan_findings(lying, plan(lying, order, config=CONFIG))
     assert todo == []
     assert "no operation comes from the side" in said(iter(found), Level.FAILS)
 
 
 def test_an_order_that_is_impossible_is_said(product: Product) -> None:
-    found, todo = plan_findings(product, ("block", "screws", "cover"), CONFIG)
+    order = ("block", "screws", "cover")
+    found, todo = plan_findings(product, plan(product, order, config=CONFIG))
     assert todo == []
     assert said(iter(found), Level.FAILS).startswith("fails    order:")
 
@@ -204,6 +256,11 @@ def own_product(drawn: Mapping[str, Manifold], folder: Path) -> str:
 @pytest.mark.slow
 def test_a_bush_a_cover_over_it_and_four_screws_pass(tmp_path: Path) -> None:
     assert main(["check", own_product(bearing_block(), tmp_path), "--quiet"]) == 0
+
+
+@pytest.mark.slow
+def test_a_box_with_a_lip_in_its_lid_and_cross_head_screws_passes(tmp_path: Path) -> None:
+    assert main(["check", own_product(box_with_lid(), tmp_path), "--quiet"]) == 0
 
 
 @pytest.mark.slow

@@ -10,7 +10,15 @@ from cell.configuration.config import CellConfig
 from cell.products.product import Product
 from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
-from planning.product_check.check import machine_findings, plan_findings, simulated_findings
+from planning.assembly_plan.planner import plan
+from planning.product_check.check import (
+    borne_torques,
+    fixture_choices,
+    fixture_findings,
+    machine_findings,
+    plan_findings,
+    simulated_findings,
+)
 from planning.product_check.finding import Finding, Level
 
 
@@ -46,7 +54,10 @@ def find(
     """
     product.check_simulable()
     found = list(machine_findings(product, config))
-    planned, todo = plan_findings(product, order, config)
-    found += planned
+    fixing = plan(product, order, config=config)
+    planned, todo = plan_findings(product, fixing)
+    choices = fixture_choices(product, fixing, config)
+    found += [*fixture_findings(fixing, choices), *planned]
     running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
-    return [*found, *simulated_findings(running.simulation, running.station, todo)]
+    borne = borne_torques(fixing, choices)
+    return [*found, *simulated_findings(running.simulation, running.station, todo, borne)]

@@ -21,6 +21,7 @@ from cell.products.product import Product
 from cell.products.read_options import ReadOptions
 from experiments.assembly.prepare import RunningCell
 from experiments.reporting.output import output_folder
+from planning.assembly_plan.planner import plan
 from planning.feasibility.directions import DIRECTIONS
 from planning.product_check.check import plan_findings
 from planning.product_check.reach import reached_grasps
@@ -87,7 +88,7 @@ def _within_reach(draft: Draft, product: Product, config: CellConfig) -> Draft:
         product: The same as a run reads it, with its models.
         config: The cell.
     """
-    _, todo = plan_findings(product, None, config)
+    _, todo = plan_findings(product, plan(product, config=config))
     if not todo:
         return draft
     reached = reached_grasps(RunningCell(product, config, seed=0).station, todo)

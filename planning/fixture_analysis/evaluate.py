@@ -201,6 +201,11 @@ class Evaluation:
             f"withstands {capacity:.1f} N sideways at that height, the operation may exert "
             f"{load.sideways:.1f} N"
         )
+        if load.torque:
+            self.figures |= {
+                "bears_turning_N_m": margin.turning * load.torque,
+                "turned_N_m": load.torque,
+            }
         if margin.turning < 1.0:
             # The hand that takes the torque has gripped the body, and takes a sideways force too.
             self.notes.append(

@@ -118,9 +118,9 @@ def first(reaches: Iterator[Reach], part: str, station: Station) -> Reach:
     raise no_grasp(station, part)
 
 
-def no_grasp(station: Station, part: str) -> Unreachable:
-    """Return the error that says that the gripper cannot take a part where it is."""
-    reason = f"no grasp of part '{part}' is reachable there"
+def no_grasp(station: Station, part: str, reason: str | None = None) -> Unreachable:
+    """Return the error that says that the gripper cannot take a part where it is, and why."""
+    reason = reason or f"no grasp of part '{part}' is reachable there"
     return Unreachable(station.holder.name, "jaw", station.pose_of(part), reason)
 
 

@@ -23,10 +23,10 @@ from cell.simulation.vocabulary import in_programs
 from planning.operations.grasping import (
     Reach,
     comes_from_above,
-    first,
     jaw_to_part,
     let_go,
     lost_grasp,
+    no_grasp,
     opened,
     raised,
     reachable_grasps,
@@ -107,7 +107,7 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     both = held | {mating.on, *station.fixed}
     yield from look(station, MatePhase.LOOK, part, closely=(part, mating.on))
     X_WGoal = goal_pose(station, mating)
-    reach = first(useful_grasps(station, mating, X_WGoal), part, station)
+    reach = useful_grasp(station, mating, X_WGoal)
     yield from take(station, part, reach, LIFT, riders)
     jaw, holding = arm.frame(reach.grasp.jaw), lost_grasp(station)
     above = raised(X_WGoal, ABOVE) @ jaw_to_part(station, part, reach.grasp).inverse()
@@ -166,7 +166,7 @@ def foresee_mating(station: Station, mating: Mating) -> None:
         Unreachable: There is none.
     """
     X_WGoal = goal_pose(station, mating)
-    first(useful_grasps(station, mating, X_WGoal), mating.part, station)
+    useful_grasp(station, mating, X_WGoal)
     station.belief.suppose(mating.part, X_WGoal)
 
 
@@ -174,6 +174,25 @@ def goal_pose(station: Station, mating: Mating) -> RigidTransform:
     """Return the pose X_WP at which the part is seated, from what is believed."""
     on, part = station.part(mating.on), station.part(mating.part)
     return station.pose_of(mating.on) @ on.X_AP.inverse() @ part.X_AP
+
+
+def useful_grasp(station: Station, mating: Mating, X_WGoal: RigidTransform) -> Reach:
+    """Return the first of the `useful_grasps`.
+
+    Raises:
+        Unreachable: There is none; it says at which end.
+    """
+    for reach in useful_grasps(station, mating, X_WGoal):
+        return reach
+    part = station.part(mating.part)
+    X_WP = station.pose_of(part.name)
+    above = [g for g in part.grasps if comes_from_above(X_WGoal, g.X_PJaw)]
+    if not above:
+        raise no_grasp(station, part.name, f"part '{part.name}' has no grasp from above")
+    if next(reachable_grasps(station, part.name, X_WP, above), None) is None:
+        raise no_grasp(station, part.name)
+    reason = f"no grasp of part '{part.name}' that is reached there suits its place on {mating.on}"
+    raise no_grasp(station, part.name, reason)
 
 
 def useful_grasps(station: Station, mating: Mating, X_WGoal: RigidTransform) -> Iterator[Reach]:

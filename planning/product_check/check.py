@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
 
 from cell.configuration.config import CellConfig
 from cell.machines.arm import Unreachable
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
 from planning.assembly_plan.explain import stop_text
-from planning.assembly_plan.planner import FixingPlan, plan
-from planning.fixture_analysis.candidate import FixtureSetup
+from planning.assembly_plan.planner import FixingPlan
+from planning.fixture_analysis.candidate import Choice, FixtureSetup
 from planning.fixture_analysis.rule import general_rule
 from planning.motion.paths import NoPath
 from planning.operations.operation import NoOperation, Step
@@ -21,49 +23,63 @@ from planning.product_check.machine_limits import machine_findings
 from planning.product_check.standing_clear import clearance_findings
 
 
-def plan_findings(
-    product: Product, order: tuple[str, ...] | None, config: CellConfig
-) -> tuple[list[Finding], list[Step]]:
-    """Return findings on the plan, and the steps that carry it out; none if it cannot be."""
-    fixing = plan(product, order, config=config)
+def plan_findings(product: Product, fixing: FixingPlan) -> tuple[list[Finding], list[Step]]:
+    """Return findings on a plan, and the steps that carry it out; none if it cannot be."""
     if fixing.stop is not None or fixing.unplanned:
         reasons = [f"{item.name} {item.reason}" for item in fixing.unplanned]
         reasons += [stop_text(fixing)] if fixing.stop else []
         return [fails("order", "; ".join(reasons))], []
-    found = list(_fixture_findings(product, fixing, config))
     try:
         todo = steps(product, fixing)
     except NoOperation as error:
-        return [*found, fails("order", str(error))], []
+        return [fails("order", str(error))], []
     names = ", ".join(step.name for step in todo)
-    return [*found, good("order", f"every step has an operation: {names}")], todo
+    return [good("order", f"every step has an operation: {names}")], todo
 
 
-def _fixture_findings(
-    product: Product, fixing: FixingPlan, config: CellConfig
-) -> Iterator[Finding]:
-    """Yield what speaks against the postures of the plan: footprint, imprint, stability."""
-    assert fixing.matrices is not None
+def fixture_choices(product: Product, fixing: FixingPlan, config: CellConfig) -> tuple[Choice, ...]:
+    """Return what the general rule says of the steps of a plan; nothing if it cannot be done."""
+    if fixing.stop is not None or fixing.unplanned or fixing.matrices is None:
+        return ()
     setup = FixtureSetup.of(config)
+    return general_rule(product, fixing.order, fixing.steps, fixing.matrices, setup)
+
+
+def fixture_findings(fixing: FixingPlan, choices: Sequence[Choice]) -> Iterator[Finding]:
+    """Yield what speaks against the postures of a plan: footprint, imprint, stability."""
     said: set[str] = set()
-    for choice, step in zip(
-        general_rule(product, fixing.order, fixing.steps, fixing.matrices, setup),
-        fixing.steps,
-        strict=True,
-    ):
+    for choice, step in zip(choices, fixing.steps, strict=bool(choices)):
         rejected = choice.candidates[choice.paper].rejected
         if rejected and rejected not in said:
             said.add(rejected)
             yield doubtful(step.fixed_part, f"on the jig while {step.item} is added: {rejected}")
-    if not said:
+    if choices and not said:
         yield good(fixing.steps[0].fixed_part, "the bag holds it, by size, depth and stability")
 
 
-def reach_findings(station: Station, todo: Sequence[Step]) -> Iterator[Finding]:
+def borne_torques(fixing: FixingPlan, choices: Sequence[Choice]) -> dict[str, float]:
+    """Return, by name of a screw, the torque about the vertical that the jig alone bears [N m]."""
+    borne: dict[str, float] = {}
+    for choice, step in zip(choices, fixing.steps, strict=bool(choices)):
+        figures = choice.candidates[choice.paper].figures
+        if "bears_turning_N_m" in figures:
+            borne |= dict.fromkeys(step.incoming, figures["bears_turning_N_m"])
+    return borne
+
+
+def reach_findings(
+    station: Station, todo: Sequence[Step], borne: Mapping[str, float] | None = None
+) -> Iterator[Finding]:
     """Yield a finding per step: whether the arms reach every pose that it plans.
 
     Each step is taken to succeed, so that the next one is seen as it will be.
+
+    Args:
+        station: Of a cell in which nothing has happened yet; it is used up.
+        todo: The steps of the plan.
+        borne: See `borne_torques`: what no hand holds against has to be borne by the jig.
     """
+    borne, screws = borne or {}, station.cell.product.screws
     station.look()
     for step in todo:
         try:
@@ -74,17 +90,33 @@ def reach_findings(station: Station, todo: Sequence[Step]) -> Iterator[Finding]:
         station.fixed = step.fixed_after(station.cell.product, station.fixed)
         if step.operation.role is not None and not remarks:
             yield good(step.name, "every pose is reached")
-        yield from (doubtful(step.name, remark) for remark in remarks)
+        for remark in remarks:
+            weak = [n for n in step.parts if borne.get(n, np.inf) < screws[n].torque]
+            if weak:
+                asked = max(screws[name].torque for name in weak)
+                yield fails(step.name, f"{remark}, {borne[weak[0]]:.2g} of {asked:.2g} N m")
+            else:
+                yield doubtful(step.name, remark)
 
 
 def simulated_findings(
-    simulation: Simulation, station: Station, todo: Sequence[Step]
+    simulation: Simulation,
+    station: Station,
+    todo: Sequence[Step],
+    borne: Mapping[str, float] | None = None,
 ) -> list[Finding]:
-    """Return what needs the cell: what stands in it, and reach."""
+    """Return what needs the cell: what stands in it, and reach; see `reach_findings`."""
     found = list(clearance_findings(simulation.cell, simulation.root))
     if any(finding.level is Level.FAILS for finding in found):
         return found
-    return [*found, *reach_findings(station, todo)]
+    return [*found, *reach_findings(station, todo, borne)]
 
 
-__all__ = ["machine_findings", "plan_findings", "simulated_findings"]
+__all__ = [
+    "borne_torques",
+    "fixture_choices",
+    "fixture_findings",
+    "machine_findings",
+    "plan_findings",
+    "simulated_findings",
+]

@@ -8,9 +8,11 @@ from cell.configuration.config import CellConfig
 from cell.errors import UnknownName
 from cell.machines.arms import arm_model
 from cell.machines.driver import largest_torque
-from cell.machines.grippers import GRIPPER_MODELS, GripperModel
+from cell.machines.grippers import GRIPPER_MODELS, GripperModel, too_wide
 from cell.products.drives import BITS
 from cell.products.product import Part, Product
+from cell.vectors import rotation_with_up
+from planning.fixture_analysis.footprint import footprint
 from planning.product_check.finding import Finding, doubtful, fails, good
 
 LEAST_ROOM = 5e-4  # [A] The jaws open this much wider than the part at least, on both sides [m].
@@ -22,7 +24,7 @@ def machine_findings(product: Product, config: CellConfig) -> Iterator[Finding]:
     gripper, payload = _holder(config)
     for part in product.parts.values():
         yield from _mass(part, gripper, payload)
-        yield from _grasps(part, gripper)
+        yield from _grasps(part, gripper, product.up)
     yield from _screws(product, config)
     yield from _bits(product)
 
@@ -51,9 +53,14 @@ def _mass(part: Part, gripper: GripperModel, payload: float) -> Iterator[Finding
         yield doubtful(part.name, text)
 
 
-def _grasps(part: Part, gripper: GripperModel) -> Iterator[Finding]:
+def _grasps(part: Part, gripper: GripperModel, up: str) -> Iterator[Finding]:
     if not part.grasps:
-        yield fails(part.name, "it has no grasp; give it one in the product file")
+        R_UpP = rotation_with_up(up) @ part.X_AP.rotation()
+        outline = footprint((part.mesh.vertices @ R_UpP.matrix().T)[:, :2])
+        width = 0.0 if outline is None else outline.narrowest
+        given = "give it one in the product file"
+        reason = too_wide(gripper, width) if width > gripper.stroke else given
+        yield fails(part.name, f"it has no grasp; {reason}")
         return
     usable = 0
     for grasp in part.grasps:

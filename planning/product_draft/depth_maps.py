@@ -59,27 +59,39 @@ class DepthMaps:
         return DepthMaps(y, z, far, near)
 
     def grip(self, y: tuple[float, float], z: tuple[float, float]) -> Grip | None:
-        """Return what two jaws meet whose faces span these ranges [m]; None for nothing."""
-        i, k = np.searchsorted(self.y, y), np.searchsorted(self.z, z)
-        far, near = self.far[i[0] : i[1], k[0] : k[1]], self.near[i[0] : i[1], k[0] : k[1]]
-        if not far.size or not np.isfinite(far).any():
+        """Return what two jaws meet whose faces span these ranges [m].
+
+        None if there is nothing that both touch, opposite to each other.
+        """
+        (i, j), (k, m) = np.searchsorted(self.y, y), np.searchsorted(self.z, z)
+        far, near = self.far[i:j, k:m], self.near[i:j, k:m]
+        if not far.size:
             return None
         top, bottom = float(far.max()), float(near.min())
         on_far, on_near = far > top - TOUCH, near < bottom + TOUCH
-        places = np.meshgrid(self.y[i[0] : i[1]], self.z[k[0] : k[1]], indexing="ij")
-        middles = [np.array([p[on].mean() for p in places]) for on in (on_far, on_near)]
         both = on_far & on_near
-        spread = 0.0
-        if both.any():
-            offsets = [p[both] - p[both].mean() for p in places]
-            spread = float(np.hypot(*offsets).mean())
+        count = int(both.sum())
+        if top == -np.inf or count == 0:
+            return None
+        ys, zs = self.y[i:j], self.z[k:m]
+        apart = np.linalg.norm(np.subtract(_middle(on_far, ys, zs), _middle(on_near, ys, zs)))
+        rows, columns = np.nonzero(both)
+        middle = _middle(both, ys, zs)
+        offsets = ys[rows] - middle[0], zs[columns] - middle[1]
         return Grip(
             width=top - bottom,
             middle=(top + bottom) / 2.0,
-            area=float(both.sum()) * CELL**2,
-            slant=float(np.linalg.norm(middles[0] - middles[1])) / max(top - bottom, 1e-6),
-            spread=spread,
+            area=count * CELL**2,
+            slant=float(apart) / max(top - bottom, 1e-6),
+            spread=float(np.hypot(*offsets).mean()),
         )
+
+
+def _middle(cells: np.ndarray, y: np.ndarray, z: np.ndarray) -> tuple[float, float]:
+    """Return the mean place of cells (n, m) of a grid [m]."""
+    along_y, along_z = cells.sum(axis=1), cells.sum(axis=0)
+    count = along_y.sum()
+    return float(along_y @ y) / count, float(along_z @ z) / count
 
 
 @dataclass(frozen=True)
@@ -102,4 +114,4 @@ class Grip:
 
     def force_closed(self, friction: float) -> bool:
         """Return whether friction alone holds the part against any small load."""
-        return self.area > 0.0 and self.slant < friction
+        return self.slant < friction

@@ -109,7 +109,7 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
             hand,
             unit_vector(product.up),
             base=meshes[base],
-            earlier=[meshes[other] for other in sorted(seen.before(name))],
+            earlier={other: meshes[other] for other in sorted(seen.before(name))},
             nest=nests[name][1],
             screws=[screw for screw in screws if screw.clamps == name],
             apart=options.config.motion.arm_clearance,

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from heapq import heapify, heappop, heappush
 
 import fcl
 import numpy as np
@@ -15,13 +16,16 @@ import trimesh
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.products.product import Grasp
-from planning.product_draft.depth_maps import CELL, DepthMaps
+from planning.product_draft.depth_maps import DepthMaps
 from planning.product_draft.hand_shape import JAWS, HandShape, surface
 
 PAD_FRICTION = 0.5  # [D] 2 a b / (a + b) of the pads' 0.8 and of 0.36, machined metal.
-LEAST_AREA = 8e-6  # [A] Of contact [m2]; a nose on a head of 3 mm has 9.
+LEAST_AREA = 5e-6  # [D] Of contact [m2]: a nose on the head of an M3 cap screw has 4.4.
+HOLD_AREA = 1e-5  # [A] At least, against a driver: noses slid off 6 mm2, and held by 16 [M] [m2].
 GOOD_AREA = 1.5e-4  # [A] More is no better [m2].
 STEP = 2.5e-3  # Between jaw places on a part [m].
+FACES = 0.95  # Cosine of 18 degrees: what looks along the approach.
+LEVELS, MOST_LEVELS = 5, 4  # [A] Undersides: digits to which heights are one [m], how many.
 SIDES_WANTED = 8  # [A] Closing directions, those with the most area.
 MARGIN, TIGHT = 1e-3, 2e-4  # [A] Kept from what stands around, open and closed [m].
 # [D] Of the end of a jaw over what the part stands on [m]: closed on a part that is smaller than
@@ -35,6 +39,8 @@ FAR_APART = 4e-3  # [A] Grasps that are nearer count as one [m].
 LARGEST_FORCE, LEAST_FORCE = 65.0, 5.0  # [R] Of 130 N for both pads; [A] a screw's.
 GRAVITY = 9.81
 LIFT_FACTOR = 10.0  # [A] Grip over the weight that friction just bears: an arm brakes.
+# [A] Of a pad by the grip [m]: jaws that close 1.5 mm further than expected have lost the part.
+SQUEEZED = 5e-4
 USUAL_FORCE, LIGHT = 40.0, 5e-3  # [A] As of the products drawn by hand [N]; lighter: less [kg].
 
 
@@ -80,9 +86,10 @@ def sample_grasps(
     found: list[RankedGrasp] = []
     for R in _orientations(mesh, up, from_side):
         maps = DepthMaps.of(mesh, R)
-        candidates = sorted(_candidates(mesh, mass, hand, maps, R), key=lambda g: -g.score)
         kept = 0
-        for ranked in candidates:
+        for ranked in _best_first(list(_places(mesh, hand, maps, R)), mass, hand, maps, R):
+            if from_side and ranked.area < HOLD_AREA:
+                continue
             if kept == 2:
                 break
             if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around, tight):
@@ -95,7 +102,7 @@ def sample_grasps(
 
 def _orientations(mesh: trimesh.Trimesh, up: np.ndarray, from_side: bool) -> Iterator[np.ndarray]:
     """Yield the axes of jaws, (3, 3) columns closing, lateral, approach."""
-    for closing in _closing_directions(mesh, up):
+    for closing in closing_directions(mesh, up):
         if not from_side:
             yield np.column_stack([closing, np.cross(-up, closing), -up])
             continue
@@ -106,7 +113,7 @@ def _orientations(mesh: trimesh.Trimesh, up: np.ndarray, from_side: bool) -> Ite
                 yield np.column_stack([closing, np.cross(z, closing), z])
 
 
-def _closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarray]:
+def closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarray]:
     """Return horizontal directions along which there is most surface to grip, both ways each."""
     level = np.abs(mesh.face_normals @ up) < 0.05
     if not level.any():
@@ -121,54 +128,126 @@ def _closing_directions(mesh: trimesh.Trimesh, up: np.ndarray) -> list[np.ndarra
     return [np.cos(t) * side + np.sin(t) * across for t in turns]
 
 
-def _candidates(
-    mesh: trimesh.Trimesh, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+@dataclass(frozen=True)
+class _Place:
+    """Where a jaw may grip: which, where the middle of its face is [m], how good that is at best.
+
+    Attributes:
+        jaw: Its name.
+        y, z: Of the middle of its face, along the jaw's axes [m].
+        lever: Distance of the mass centre from it along y [m].
+        bound: Score of a grasp there with as much contact as counts.
+    """
+
+    jaw: str
+    y: float
+    z: float
+    lever: float
+    bound: float
+
+
+def _best_first(
+    places: Sequence[_Place], mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
 ) -> Iterator[RankedGrasp]:
-    """Yield the grasps with jaws along R that hold a part, whatever else is around."""
+    """Yield the grasps with jaws along R that hold a part, whatever else is around, best first.
+
+    A place is looked at only when no grasp that is known is better than it can be.
+    """
+    found: dict[int, RankedGrasp] = {}
+    queue = [(-place.bound, False, number) for number, place in enumerate(places)]
+    heapify(queue)
+    while queue:
+        _, is_found, number = heappop(queue)
+        if is_found:
+            yield found.pop(number)
+            continue
+        ranked = _grasp_at(places[number], mass, hand, maps, R)
+        if ranked is not None:
+            found[number] = ranked
+            heappush(queue, (-ranked.score, True, number))
+
+
+def _places(
+    mesh: trimesh.Trimesh, hand: HandShape, maps: DepthMaps, R: np.ndarray
+) -> Iterator[_Place]:
+    """Yield the places of all jaws along R."""
     p_Com = mesh.center_mass @ R
     setback = 1e-3
+    undersides = _undersides(mesh, R[:, 2])
     for jaw in JAWS:
-        face, (least, most) = hand.faces[jaw], hand.widths(jaw)
-        half_y, half_z = face.size[0] / 2.0, face.size[1] / 2.0
-        ys = _places(maps.y, p_Com[1], half_y)
-        # Besides, with the end of the jaw just beyond what the part stands on.
-        ends = maps.z[-1] + CELL / 2.0 - half_z - np.array(ABOVE_GROUND)
-        zs = [*_places(maps.z, p_Com[2], half_z - setback), *ends]
-        for y in ys:
+        half_y, half_z = (size / 2.0 for size in hand.faces[jaw].size)
+        # Besides, with the end of the jaw just above what the part may stand on.
+        ends = np.subtract.outer(undersides - half_z, ABOVE_GROUND).ravel()
+        zs = [*_steps(maps.z, p_Com[2], half_z - setback), *ends]
+        for y in _steps(maps.y, p_Com[1], half_y):
+            lever = abs(y - p_Com[1])
             for z in zs:
-                grip = maps.grip((y - half_y, y + half_y), (z - half_z, z + half_z))
-                if (
-                    grip is None
-                    or not least <= grip.width <= most - 1e-3
-                    or grip.area < LEAST_AREA
-                    or not grip.force_closed(PAD_FRICTION)
-                ):
-                    continue
-                lever = abs(y - p_Com[1])
-                force = _force(mass, lever, grip.spread)
-                if force > LARGEST_FORCE:
-                    continue
-                score = min(grip.area / GOOD_AREA, 1.0) - 30.0 * lever - 5.0 * abs(z - p_Com[2])
-                p_PJaw = R @ [grip.middle, y - face.middle[0], z - face.middle[1]]
-                X_PJaw = RigidTransform(RotationMatrix(R), p_PJaw)
-                grasp = Grasp("", jaw, X_PJaw, grip.width, force)
-                yield RankedGrasp(grasp, score, grip.area, lever)
+                bound = 1.0 - 30.0 * lever - 5.0 * abs(z - p_Com[2])
+                yield _Place(jaw, float(y), float(z), float(lever), float(bound))
 
 
-def _places(grid: np.ndarray, middle: float, half: float) -> np.ndarray:
+def _undersides(mesh: trimesh.Trimesh, approach: np.ndarray) -> np.ndarray:
+    """Return how far along the approach faces look that way, (n,), the part's end among them [m].
+
+    A lid stands on its rim, and not on the lip below it.
+    """
+    ahead = mesh.face_normals @ approach > FACES
+    depths = np.append(mesh.triangles_center[ahead], mesh.vertices, axis=0) @ approach
+    levels = np.round(depths[: ahead.sum()], LEVELS)
+    area = {level: float(mesh.area_faces[ahead][levels == level].sum()) for level in set(levels)}
+    wide = sorted(area, key=lambda level: (-area[level], level))[:MOST_LEVELS]
+    return np.unique([*wide, round(float(depths.max()), LEVELS)])
+
+
+def _grasp_at(
+    place: _Place, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+) -> RankedGrasp | None:
+    """Return the grasp at a place, if it holds a part of a mass [kg]."""
+    face, (least, most) = hand.faces[place.jaw], hand.widths(place.jaw)
+    half_y, half_z = face.size[0] / 2.0, face.size[1] / 2.0
+    y, z = place.y, place.z
+    grip = maps.grip((y - half_y, y + half_y), (z - half_z, z + half_z))
+    if (
+        grip is None
+        or not least <= grip.width <= most - 1e-3
+        or grip.area < LEAST_AREA
+        or not grip.force_closed(PAD_FRICTION)
+    ):
+        return None
+    force = _force(mass, place.lever, grip.spread, SQUEEZED * hand.stiffness(place.jaw) * grip.area)
+    if force is None:
+        return None
+    p_PJaw = R @ [grip.middle, y - face.middle[0], z - face.middle[1]]
+    grasp = Grasp("", place.jaw, RigidTransform(RotationMatrix(R), p_PJaw), grip.width, force)
+    score = place.bound - 1.0 + min(grip.area / GOOD_AREA, 1.0)
+    return RankedGrasp(grasp, score, grip.area, place.lever)
+
+
+def _steps(grid: np.ndarray, middle: float, half: float) -> np.ndarray:
     """Return the places of a face that meets a part, from the middle outwards."""
     low, high = grid[0] - half + STEP, grid[-1] + half - STEP
     steps = np.arange(np.ceil((low - middle) / STEP), np.floor((high - middle) / STEP) + 1)
     return middle + STEP * steps[np.argsort(np.abs(steps), kind="stable")]
 
 
-def _force(mass: float, lever: float, spread: float) -> float:
-    """Return the grip force per pad [N]: it bears the weight, and its moment about the pads."""
+def _force(mass: float, lever: float, spread: float, most: float) -> float | None:
+    """Return the grip force per pad: it bears the weight, and its moment about the pads [N].
+
+    None if that takes more than the gripper gives, or than the pads bear.
+
+    Args:
+        mass: [kg].
+        lever: Distance of the mass centre from the line between the pads [m].
+        spread: Mean distance of what touches from its middle [m].
+        most: That squeezes the pads as far as they may be [N].
+    """
     weight = mass * GRAVITY
     bears = weight / (2.0 * PAD_FRICTION)
     turns = weight * lever / (2.0 * PAD_FRICTION * max(spread, 5e-4))
+    needed = max(LIFT_FACTOR * bears, 2.0 * turns, LEAST_FORCE)
+    most = min(most, LARGEST_FORCE)
     usual = USUAL_FORCE if mass > LIGHT else LEAST_FORCE
-    return float(np.ceil(max(LIFT_FACTOR * bears, 2.0 * turns, usual)))
+    return None if needed > most else float(np.ceil(max(needed, min(usual, most))))
 
 
 def _is_near(ranked: RankedGrasp, found: Sequence[RankedGrasp]) -> bool:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 import trimesh
@@ -22,6 +22,7 @@ from planning.product_draft.grasp_sampling import RankedGrasp, sample_grasps
 from planning.product_draft.guess import Guess
 from planning.product_draft.hand_shape import HandShape, surface
 from planning.product_draft.joint_guesses import ScrewGuess
+from planning.product_draft.no_grasp import why_no_grasp
 
 BED_RISE = 0.016  # [M] The bed reaches this far up a part that is pressed in [m].
 BED_SIDE = 0.3  # Of the plane that stands for it [m].
@@ -36,7 +37,7 @@ def part_grasps(
     up: np.ndarray,
     *,
     base: trimesh.Trimesh,
-    earlier: Sequence[trimesh.Trimesh],
+    earlier: Mapping[str, trimesh.Trimesh],
     nest: Nest,
     screws: Sequence[ScrewGuess] = (),
     apart: float = 0.0,
@@ -48,23 +49,25 @@ def part_grasps(
         hand: The gripper.
         up: (3,) direction that points up.
         base: The part that the fixture holds, in A [m].
-        earlier: What is there when it is put, in A [m].
+        earlier: By name, what is there when it is put, in A [m].
         nest: Its place in the tray.
         screws: That clamp it: it is held from the side, beside the driver, while they are driven.
         apart: Distance kept between the arms [m].
     """
-    bed = surface(_bed(base, up))
     assert part.X_TrayP is not None
-    taken = surface(_nest_in_part(nest, part.X_TrayP))
-    put = [surface(mesh) for mesh in earlier]
-    above = sample_grasps(part.mesh, part.mass, hand, up, [taken, bed, *put])
-    guesses = [_guess(part.name, above, "from above")]
+    there = {"the bed": surface(_bed(base, up))}
+    there |= {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
+    around = {"its nest": surface(_nest_in_part(nest, part.X_TrayP)), **there}
+    above = sample_grasps(part.mesh, part.mass, hand, up, [*around.values()])
+    why = "" if above else why_no_grasp(part.mesh, part.mass, hand, up, around)
+    guesses = [_guess(part.name, above, "from above", why)]
     side: list[RankedGrasp] = []
     if screws:
-        driver = surface(joined([_driver_over(screw, apart) for screw in screws]))
-        around = [bed, *put, driver]
-        side = sample_grasps(part.mesh, part.mass, hand, up, around, from_side=True)
-        guesses.append(_guess(part.name, side, "from the side, while it is screwed down"))
+        there["the driver"] = surface(joined([_driver_over(screw, apart) for screw in screws]))
+        side = sample_grasps(part.mesh, part.mass, hand, up, [*there.values()], from_side=True)
+        # No more is said of why there is none: the fixture alone holds it then.
+        how = "from the side, while it is screwed down"
+        guesses.append(_guess(part.name, side, how, "nothing fits between what is around"))
     return [ranked.grasp for ranked in (*above, *side)], guesses
 
 
@@ -97,9 +100,9 @@ def _driver_over(screw: ScrewGuess, apart: float) -> trimesh.Trimesh:
     return column
 
 
-def _guess(part: str, found: Sequence[RankedGrasp], how: str) -> Guess:
+def _guess(part: str, found: Sequence[RankedGrasp], how: str, why: str) -> Guess:
     if not found:
-        return Guess(part, f"no grasp {how}", "nothing fits between what is around", 0.9)
+        return Guess(part, f"no grasp {how}", why, 0.9)
     best = found[0]
     what = f"{len(found)} grasps {how}, the best {1e3 * best.grasp.width:.3g} mm wide"
     reason = (

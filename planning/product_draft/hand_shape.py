@@ -12,7 +12,7 @@ import fcl
 import numpy as np
 import trimesh
 
-from cell.cad.grippers import BODY_RADIUS, BRIDGE, STEM
+from cell.cad.grippers import BODY_RADIUS, BRIDGE, PAD_CONTACT, STEM
 from cell.cad.shapes import joined
 from cell.machines.grippers import GripperModel
 
@@ -47,6 +47,7 @@ class HandShape:
             "wide": np.array([0.0, tips.wing_y, 0.0]),
             "nose": np.array([0.0, 0.0, tips.nose_z]),
         }
+        self._thickness = {"tip": tips.pad[0], "wide": tips.wing[0], "nose": tips.nose[0]}
         wing_x = tips.wing_offset + tips.wing[0] / 2
         self._fixed = [STEM[1:], BRIDGE[1:]]
         self._pads = [
@@ -60,6 +61,13 @@ class HandShape:
         """Return the smallest and largest width that a jaw grips [m]."""
         setback = self.gripper.setback[jaw]
         return setback + LEAST_OPENING, setback + self.gripper.stroke
+
+    def stiffness(self, jaw: str) -> float:
+        """Return the pressure of a pad per depth to which it is squeezed [Pa/m].
+
+        Drake's pressure rises to the modulus where the pad is half as thick.
+        """
+        return PAD_CONTACT.modulus / (self._thickness[jaw] / 2.0)
 
     def shape(self, opening: float, margin: float) -> fcl.BVHModel:
         """Return the hand's surface in the frame tip.

@@ -37,6 +37,14 @@ GRIPPER_85 = GripperModel(
 GRIPPER_MODELS: dict[str, GripperModel] = {model.name: model for model in (HAND_E, GRIPPER_85)}
 
 
+def too_wide(gripper: GripperModel, width: float) -> str:
+    """Return in words that a part [m] is wider than a gripper opens, and which one would do."""
+    wider = [model.name for model in GRIPPER_MODELS.values() if model.stroke > width]
+    other = f"; as the tool of its arm, {' or '.join(wider)} opens wider" if wider else ""
+    opens = f"{gripper.name} opens {1e3 * gripper.stroke:.3g} mm"
+    return f"it is {1e3 * width:.3g} mm across, and {opens}{other}"
+
+
 def gripper_model(name: str) -> GripperModel:
     """Return a type of gripper.
 

@@ -7,7 +7,7 @@ way. Screws that ask for two passes are all tightened to half their torque first
 
 from __future__ import annotations
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -164,7 +164,7 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
         return ()
     away = {station.holder.name: station.holder.home}
     for bolt in step.parts:
-        if not ways_above(station, bolt, away):
+        if not is_reached(station, bolt, away):
             _above(station, bolt, away)  # Raises what is said of it.
     if not holds:
         return ()
@@ -176,7 +176,7 @@ def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
     """Return whether the driver reaches bolts while the hand holds what they clamp."""
     jaws = opened(station.cell.gripper.model, reach.grasp).opening / 2
     hand = {station.holder.name: reach.q_at, station.hand: np.full(2, jaws)}
-    return all(ways_above(station, bolt, hand) for bolt in bolts)
+    return all(is_reached(station, bolt, hand) for bolt in bolts)
 
 
 def _tighten_all(station: Station, order: Sequence[str]) -> Generator[Phase, Outcome, None]:
@@ -310,7 +310,7 @@ def _above(
     """
     driver = station.driver
     near = driver.positions(station.context)
-    found = ways_above(station, bolt, elsewhere)
+    found = list(ways_above(station, bolt, elsewhere))
     if not found:
         X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
         reason = "no turn of the driver keeps clear there"
@@ -318,10 +318,17 @@ def _above(
     return min(found, key=lambda q: float(np.max(np.abs(q - near))))
 
 
+def is_reached(
+    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
+) -> bool:
+    """Return whether there is a way over a bolt's head; the arguments: `ways_above`."""
+    return any(True for _ in ways_above(station, bolt, elsewhere))
+
+
 def ways_above(
     station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
-) -> list[np.ndarray]:
-    """Return configurations (n,) over a bolt's head, turned any way about its axis.
+) -> Iterator[np.ndarray]:
+    """Yield configurations (n,) over a bolt's head, turned any way about its axis.
 
     Args:
         station: The planner's view of the cell.
@@ -331,11 +338,9 @@ def ways_above(
     driver, holding = station.driver, _holding(station)
     tip, near = driver.frame("tool_tip"), driver.positions(station.context)
     X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
-    found: list[np.ndarray] = []
     for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
         X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
-        found += station.configurations(driver, tip, X, near, holding, FINE_CLEARANCE, elsewhere)
-    return found
+        yield from station.configurations(driver, tip, X, near, holding, FINE_CLEARANCE, elsewhere)
 
 
 def come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:
