@@ -33,7 +33,7 @@ from cell.products.loading import load_product
 from cell.products.product import Product
 from cell.simulation.phase import PhaseFailed
 from cell.whole_file import whole_file
-from experiments.cli.common import BadUsage, Common
+from experiments.cli.common import BadUsage, Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.paper.cases import Case, case_seed, cases_of
 from experiments.paper.rig_hand import RigBench
@@ -94,10 +94,7 @@ def run(options: Options) -> int:
         RunFailure: A scene did not come about.
     """
     cases, config = cases_of("place", options.part), options.common.load_config()
-    for name in ("views", "views_per_scene"):
-        if getattr(options, name) < 1:
-            shown = name.replace("_", "-")
-            raise BadUsage(f"--{shown} must be at least 1, not {getattr(options, name)}.")
+    check_counts(options, "views", "views_per_scene")
     kind = config.workcell.fixture
     if fixture_class(kind).custom:
         raise BadUsage(f"Fixture '{kind}' is made for one posture: name another.")
