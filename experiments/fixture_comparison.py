@@ -39,6 +39,7 @@ from cell.fixtures.rigid_jig import RigidJig
 from cell.fixtures.support_jig import SupportJig
 from cell.products.loading import load_product
 from cell.products.product import Product
+from experiments.campaigns.code_version import code_digest
 from experiments.cli.common import Common
 from experiments.cli.ending import exit_code
 from experiments.paper.cases import case_seed
@@ -60,8 +61,8 @@ DISTURBED = {
     "push.jig_position_sigma": 0.0,
 }
 EXACT = {**DISTURBED, "push.grasp_position_sigma": 0.0, "push.grasp_angle_sigma_deg": 0.0}
-# The paper's marks [S]: ease of fixing, versatility, positioning; it marks no custom jig.
 FILE = "comparison.json"
+# The paper's marks [S]: ease of fixing, versatility, positioning; it marks no custom jig.
 PAPER = {
     "soft_jig": (True, True, False),
     "support_jig": (False, True, True),
@@ -290,7 +291,7 @@ def rows_in(file: Path, about: Mapping[str, Any]) -> list[Row]:
     """Return the rows that a file has already.
 
     Raises:
-        InputError: They were made with other options, or it is no file of this script.
+        InputError: They were made with other options or code, or it is no file of this script.
     """
     if not file.exists():
         return []
@@ -327,6 +328,7 @@ def run(options: ComparisonOptions) -> int:
         "seed": options.common.seed,
         "pulls": options.pulls,
         "settings": digest(config),
+        "code": code_digest(Path(__file__)),
     }
     console = Console(quiet=options.common.quiet, highlight=False, width=180)
     with output_folder(options.common.out) as out:

@@ -116,6 +116,12 @@ def test_designs_are_combined() -> None:
     assert combined(grid({}), sample({}, 4)) == [{}]
 
 
+@pytest.mark.parametrize("number", [0, -4])
+def test_no_samples_are_refused_in_a_program_too(number: int) -> None:
+    with pytest.raises(InputError, match="at least 1"):
+        sample({"push.speed": (0.1, 0.2)}, number)
+
+
 def test_grids_and_samples_are_read_from_text() -> None:
     assert parse_grid(["a.b=1,2.5,x", 'order="b,a","a,b"', "flag=true"]) == {
         "a.b": [1, 2.5, "x"],

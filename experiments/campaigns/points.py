@@ -47,6 +47,8 @@ def sample(
     for name, (low, high) in ranges.items():
         if not low < high:
             raise InputError(f"--sample {name}={low:g}:{high:g}: the first end must be smaller.")
+    if number < 1:
+        raise InputError(f"--samples must be at least 1, not {number}.")
     if design == "sobol" and number & (number - 1):
         raise InputError(
             f"--samples {number}: Sobol's points are balanced for powers of 2 only; take "

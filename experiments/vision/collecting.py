@@ -138,6 +138,7 @@ def _shots(
                 for _ in range(min(VIEWS_PER_LIGHTING, count - len(shots))):
                     next(views)
                     shot = studio.take(query, rng)
+                    # Of the hand its labels are taken: a rendering of its model would be the same.
                     hand = studio.hand(shot.bodies) if hand is None else hand
                     taken += 1
                     one = marked(shot, studio.camera.pinhole)
