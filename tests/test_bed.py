@@ -69,6 +69,18 @@ def balance(bed: Bed) -> float:
     return float(new_bed().volume) + booked - bed.volume
 
 
+def test_a_face_becomes_a_wall_little_by_little() -> None:
+    """A plate on its edge that leans past the angle of a wall gains no face at once."""
+    plate = SurfaceSamples.of("plate", trimesh.creation.box((0.06, 0.004, 0.04)))
+    angles = np.deg2rad(np.arange(3.0, 15.0, 0.25))
+    turns = [trimesh.transformations.rotation_matrix(a, [1, 0, 0])[:3, :3] for a in angles]
+    areas = np.array([plate.underside(R_JP, 0.0015).areas.sum() for R_JP in turns])
+    edge = 0.06 * 0.004
+    assert areas[0] == pytest.approx(edge * np.cos(angles[0]), rel=0.02)
+    assert areas[-1] > 1.5 * edge
+    assert np.abs(np.diff(areas)).max() < 0.1 * edge
+
+
 def test_pressing_conserves_volume(punch: SurfaceSamples) -> None:
     """The volume under the punch rises as a collar, with the dilation of the beads, to rounding."""
     bed = new_bed()

@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+import trimesh
 from test_jam_postures import POSTURES, PRESS_FORCE
 
 from cell import load_product
 from cell.fixtures.soft_jig import JigState
+from cell.fixtures.soft_jig.parameters import BagParameters, SoilParameters
+from cell.fixtures.soft_jig.soft.bed import Bed
+from cell.fixtures.soft_jig.soft.samples import SurfaceSamples
 from cell.fixtures.soft_jig.soft.stable import Carried, largest_stiffness, normal_rows
 from experiments.jig.element_rig import ElementRig
 from experiments.jig.specimens import ProductPart
@@ -53,6 +57,25 @@ def test_stiffness_is_bounded_by_step_and_inertia() -> None:
     bound = largest_stiffness(inertia, arms, areas, 1e-3)
     assert 0.5 < bound * areas.sum() * 1e-6 / 0.1 < 1.0
     assert largest_stiffness(inertia, arms, areas, 5e-4) == pytest.approx(4 * bound)
+
+
+def test_block_that_swings_between_pads_comes_to_rest_under_traction() -> None:
+    """Pressed in and sideways, free to turn about the pads: friction must not keep it swinging."""
+    bed, dt, inertia = Bed(BagParameters(), SoilParameters()), 1e-3, 4e-5
+    samples = SurfaceSamples.of("block", trimesh.creation.box((0.036, 0.044, 0.032)))
+    spatial = np.diag([inertia] * 3 + [0.14] * 3)
+    position, angle, rate, rates = np.array([0.0, 0.0, bed.bag.cap_height + 0.016]), 0.0, 0.0, []
+    for k in range(700):
+        velocity = np.array([0.01, 0.0, -0.02]) if k < 300 else np.zeros(3)
+        R_JP = trimesh.transformations.rotation_matrix(angle, [0, 1, 0])[:3, :3]
+        V_JP = np.array([0.0, rate, 0.0]), velocity
+        _, torque = bed.press((R_JP, position), V_JP, samples, dt, spatial)
+        bed.settle(dt)
+        rate += dt * torque[1] / inertia
+        angle, position = angle + dt * rate, position + dt * velocity
+        rates.append(rate)
+    assert 0.05 < angle < 0.4
+    assert np.abs(rates[-100:]).max() < 1e-6  # [rad/s]
 
 
 def test_predicted_velocity_is_backward_euler() -> None:
