@@ -145,6 +145,26 @@ def test_threaded_holes_are_filled_and_the_bolt_has_its_washer() -> None:
     assert model.error.less < 1e-3
 
 
+@pytest.mark.parametrize("head_up", [True, False])
+def test_what_a_screw_clamps_bears_under_its_head(head_up: bool) -> None:
+    """On the face away from the head, around the hole, where no other piece of it is."""
+    cover = meshes(covered_block())["cover"]
+    number, drawn = next((n, c) for n, c in enumerate(cylinders_of(cover)) if c.hole)
+    uses = {number: Use("clearance", bearing=3.2 * MM, head_up=head_up)}
+    model = contact_model(cover, cylinders_of(cover), uses, fixed=False)
+    height = drawn.flare_low[1] if head_up else drawn.flare_high[1]
+    seats = [piece for piece in model.pieces if piece.name.startswith(f"seat_{number}_")]
+    ends = [(s.shape.vertices - drawn.point) @ drawn.axis for s in seats]
+    assert all(np.abs(h - height).min() < 1e-9 for h in ends)
+    assert all(np.abs(h - height).max() < 0.45 * drawn.length for h in ends)
+    radii = np.concatenate([about(seat, drawn) for seat in seats])
+    assert drawn.radius < radii.min() < 3.2 * MM * 2**0.5 < radii.max()
+    middle = np.mean([seat.shape.center_mass for seat in seats], axis=0) - drawn.point
+    assert np.linalg.norm(np.cross(middle, drawn.axis)) < 1e-5
+    fixed = contact_model(cover, cylinders_of(cover), uses, fixed=True)
+    assert not any(piece.name.startswith("seat") for piece in fixed.pieces)
+
+
 def test_friction_radius_is_that_of_the_parts_drawn_by_hand() -> None:
     number, _ = hole(PLATE, mu.BOLT_HOLE_RADIUS)
     uses = {number: Use("clearance", bearing=mu.BEARING_RADIUS * MM)}

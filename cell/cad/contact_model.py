@@ -1,10 +1,10 @@
 """Contact pieces of any closed mesh: exact where something fits, convex everywhere else.
 
 Round holes are cut out as a window of few flat sides, and their wall is a rigid open band of
-facets; round bosses are convex solids of revolution; the rest is cut along the planes of its
-concave edges. The part that the fixture holds is rigid, what is brought to it is compliant, so that
-two rigid surfaces never meet: those would touch as their convex hulls. Lengths in metres outside,
-in millimetres inside.
+facets; what a screw clamps keeps its face under the screw (`cell.cad.screw_seat`); round bosses are
+convex solids of revolution; the rest is cut along the planes of its concave edges. The part that
+the fixture holds is rigid, what is brought to it is compliant, so that two rigid surfaces never
+meet: those would touch as their convex hulls. Lengths in metres outside, in millimetres inside.
 """
 
 from __future__ import annotations
@@ -29,6 +29,7 @@ from cell.cad.motor_unit import (
     friction_radius,
 )
 from cell.cad.round_features import Cylinder
+from cell.cad.screw_seat import screw_seat
 from cell.cad.sdf import Contact, Piece
 from cell.cad.shapes import convex_revolve, joined, open_band, to_trimesh
 
@@ -117,6 +118,12 @@ def contact_model(
         kind = "wall" if use.kind == "fit" else "washer"
         band = _wall(cylinder, use) if use.kind == "fit" else _washer(cylinder, use)
         pieces.append(Piece(f"{kind}_{number}", _metres(band), Contact(FIT_FRICTION)))
+        if use.kind == "clearance" and not fixed:
+            for k, seat in enumerate(screw_seat(solid, window, _towards_head(cylinder, use))):
+                surface = _metres(to_trimesh(seat))
+                pieces.append(
+                    Piece(f"seat_{number}_{k}", surface, _metal(BODY_FRICTION), convex=True)
+                )
     for number, cylinder in features.items():
         if not cylinder.hole and _is_solid(solid, cylinder):
             surface, room = _boss(cylinder, drawn)
@@ -261,13 +268,17 @@ def _wall(cylinder: Cylinder, use: Use) -> trimesh.Trimesh:
     return band
 
 
+def _towards_head(cylinder: Cylinder, use: Use) -> Cylinder:
+    return cylinder if use.head_up else cylinder.reversed()
+
+
 def _washer(cylinder: Cylinder, use: Use) -> trimesh.Trimesh:
     """Return the face under a bolt's head and the wall of its hole [mm].
 
     The wall ends short of both faces, and has its corners within the flats of those: see
     `cell.cad.motor_unit.washer_surface`.
     """
-    towards_head = cylinder if use.head_up else cylinder.reversed()
+    towards_head = _towards_head(cylinder, use)
     top, bottom = towards_head.flare_high[1], towards_head.flare_low[1]
     inner, radius = cylinder.radius + BOLT_HOLE_EDGE, cylinder.mean_radius
     edge = min(BOLT_HOLE_EDGE, 0.2 * (top - bottom))
