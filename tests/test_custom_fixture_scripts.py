@@ -9,10 +9,16 @@ import numpy as np
 import pytest
 import trimesh
 import tyro
+from pydrake.geometry import Box, ProximityProperties, Role
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
 
 from cell import CellConfig, load_product
 from cell.errors import InputError
 from cell.fixtures.base import FixtureError
+from cell.fixtures.custom.work import Work
+from cell.fixtures.rigid_jig import RigidJig
 from cell.vectors import rotation_with_up
 from experiments import fixture_comparison
 from experiments.assembly.custom_fixture import with_fixture_for
@@ -70,6 +76,31 @@ def test_exact_grasp_seats_the_part_to_within_its_play(fixture: str, case: str) 
     assert trial.failure is None
     assert measured["seat_error_m"] < 1e-4
     assert measured["seat_error_rad"] < 1e-3
+
+
+@pytest.mark.parametrize("pieces", [1, 2, 3])
+def test_part_of_any_number_of_contact_pieces_meets_the_nest_with_its_surface_alone(
+    pieces: int,
+) -> None:
+    """The plant's list of them grows when the surface is added to it."""
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)
+    mesh = trimesh.creation.box((0.05, 0.04, 0.02))
+    work = Work("box", "+z", mesh, rotation_with_up("+z"), CellConfig().custom)
+    nest = RigidJig(plant, scene_graph, plant.AddRigidBody("base"), work)
+    part = plant.AddRigidBody("body", plant.AddModelInstance("box"))
+    own = [
+        plant.RegisterCollisionGeometry(
+            part, RigidTransform(), Box(0.05, 0.04, 0.02), f"piece_{k}", ProximityProperties()
+        )
+        for k in range(pieces)
+    ]
+    nest.add_part(plant, part, mesh)
+    inspector = scene_graph.model_inspector()
+    names = {inspector.GetName(i): i for i in inspector.GetAllGeometryIds(Role.kProximity)}
+    wall = next(i for name, i in names.items() if name.endswith("wall_0"))
+    assert all(inspector.CollisionFiltered(wall, piece) for piece in own)
+    assert not inspector.CollisionFiltered(wall, names["box::surface"])
 
 
 def test_script_writes_what_has_to_be_made(tmp_path: Path) -> None:
