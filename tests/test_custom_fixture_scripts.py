@@ -8,7 +8,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-import tyro
 from pydrake.geometry import Box, ProximityProperties, Role
 from pydrake.math import RigidTransform
 from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
@@ -20,11 +19,8 @@ from cell.fixtures.base import FixtureError
 from cell.fixtures.custom.work import Work
 from cell.fixtures.rigid_jig import RigidJig
 from cell.vectors import rotation_with_up
-from experiments import fixture_comparison
 from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.custom_fixture import main as write_fixture
-from experiments.fixture_comparison import ComparisonOptions, Row
-from experiments.fixture_comparison import main as compare_fixtures
 from experiments.paper.larger_part import larger
 from experiments.paper.postures import POSTURES
 from experiments.paper.product_postures import postures_of
@@ -121,57 +117,7 @@ def test_scripts_refuse_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "takes any part" in capsys.readouterr().err
     assert write_fixture(["--part", "wheel", *out]) == 2
     assert "Known: bolt_1" in capsys.readouterr().err
-    assert compare_fixtures(["--case", "motor/P9", *out]) == 2
     assert not (tmp_path / "new").exists()
-
-
-@pytest.mark.slow
-def test_comparison_of_one_posture(tmp_path: Path) -> None:
-    arguments = ["--products", "motor_unit", "--case", "plate/P1", "--trials", "1"]
-    arguments += ["--quiet", "--out", str(tmp_path)]
-    assert compare_fixtures(arguments) == 0
-    rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
-    assert [row["refused"] for row in rows] == [""] * 7
-    drawn = {row["fixture"]: row for row in rows if not row["larger_m"]}
-    soft, posts, nest = (drawn[name] for name in ("soft_jig", "support_jig", "rigid_jig"))
-    assert soft["holds"]["force +z"]["load"] > 3 * nest["holds"]["force +z"]["load"]
-    for rigid in (posts, nest):
-        assert 0.6 < rigid["holds"]["force +z"]["load"] < 1.0  # The weight is 0.67 N.
-        assert rigid["holds"]["force +y"]["load"] > soft["holds"]["force +y"]["load"] / 3
-
-
-def test_interrupted_comparison_is_continued(tmp_path: Path, monkeypatch, capsys) -> None:
-    """Rows that are there are kept, also those that were refused; another seed is refused."""
-    made: list[tuple] = []
-
-    def counted(config, wanted, options) -> Row:
-        made.append(wanted.key)
-        if len(made) == 2:
-            raise KeyboardInterrupt
-        return Row(wanted.source, wanted.fixture, wanted.posture.label, wanted.larger, "no")
-
-    monkeypatch.setattr(fixture_comparison, "compare", counted)
-    arguments = [
-        "--products",
-        "motor_unit",
-        "--case",
-        "motor/P1",
-        "--quiet",
-        "--out",
-        str(tmp_path),
-    ]
-    with pytest.raises(KeyboardInterrupt):
-        fixture_comparison.run(options_of(arguments))
-    assert compare_fixtures(arguments) == 0
-    assert len(made) == 8 and len(set(made)) == 7
-    rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
-    assert [row["larger_m"] for row in rows] == [0.0, 0.0, 1e-4, 3e-4, 0.0, 1e-4, 3e-4]
-    assert compare_fixtures([*arguments, "--seed", "3"]) == 2
-    assert "choose another --out" in capsys.readouterr().err
-
-
-def options_of(arguments: list[str]) -> ComparisonOptions:
-    return tyro.cli(ComparisonOptions, args=arguments)
 
 
 def test_larger_part_has_every_face_moved_outward() -> None:
