@@ -330,7 +330,7 @@ def test_trials_of_one_posture_on_three_fixtures(tmp_path: Path) -> None:
     loads = [bearing(task, case="plate/P1").measured for task in (soft, posts, nest)]
     assert loads[0]["force_+z_N"] > 3 * loads[2]["force_+z_N"]
     for rigid in loads[1:]:
-        assert 0.6 < rigid["force_+z_N"] < 1.0  # The weight is 0.67 N.
+        assert 0.67 < rigid["force_+z_N"] < 2 * 0.67  # The weight [N], and friction of the walls.
         assert rigid["force_+y_N"] > loads[0]["force_+y_N"] / 3
 
 
