@@ -12,8 +12,9 @@ size. The hand is that of the rig, the jig is where it is believed to be. With -
 products are assembled on each fixture, too.
 
 A campaign: every trial is kept as it ends, and the same command goes on where it was stopped.
-Prints the tables, and writes them to comparison.html and comparison.json. A placement takes 4 to 12
-CPU seconds, the pulls 15 to 30, an assembly of the motor unit 80 to 100.
+Prints the tables, and writes them to comparison.html and comparison.json. A placement takes 4 to 20
+CPU seconds, the pulls 20 to 40, an assembly of the motor unit 100, and on a fixture that is made
+for a part more than twice that.
 """
 
 from __future__ import annotations
