@@ -11,6 +11,7 @@ The folders are what the scripts share, from the lowest up:
 - `speed`: what a simulated second costs.
 - `jig`: element tests of the soft jig alone, and what it holds.
 - `paper`: its experiments, ``soft-jig place`` and ``push``.
+- `fixtures`: soft jig, jig with supports and custom jig side by side, for `fixture_comparison`.
 - `compare`: what differs between two results beyond its tolerance, ``soft-jig compare``.
 - `regress`: experiments against stored metrics, ``soft-jig regress``.
 - `studies`: what `pose_error_study`, `jig_design_study` and `product_variants` share.

@@ -23,7 +23,6 @@ from rich.console import Console
 from rich.table import Table
 from tyro.conf import OmitArgPrefixes
 
-from cell.cad.shapes import to_trimesh
 from cell.configuration.config import CellConfig
 from cell.errors import CellError
 from cell.products.loading import load_product
@@ -33,7 +32,7 @@ from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
 from experiments.product.check import find
 from experiments.product.init import PRODUCT_FILE, Wanted, run_init
-from experiments.product.random_drawing import Drawing, draw
+from experiments.product.random_drawing import draw, write_cad
 from experiments.reporting.output import output_folder, write_json
 from experiments.reporting.result_file import RESULT
 from planning.product_check.finding import Level
@@ -110,7 +109,7 @@ def _trial(number: int, folder: Path, config: CellConfig, only_check: bool) -> T
 
     own = folder / "own"
     try:
-        source = _write(drawing, folder / "cad")
+        source = write_cad(drawing, folder / "cad")
         run_init(Wanted(source, units="mm"), own, config, quiet=True)
         clock.append(time.process_time())
         product = load_product(own / PRODUCT_FILE)
@@ -129,13 +128,6 @@ def _trial(number: int, folder: Path, config: CellConfig, only_check: bool) -> T
         return trial(FAILED, str(error))
     reason = _reason(json.loads((run / RESULT).read_text()))
     return trial(FAILED if reason else ASSEMBLED, reason)
-
-
-def _write(drawing: Drawing, folder: Path) -> Path:
-    folder.mkdir(parents=True, exist_ok=True)
-    for name, solid in drawing.parts.items():
-        to_trimesh(solid).export(folder / f"{name}.stl")
-    return folder
 
 
 def _reason(result: dict) -> str:  # pyright: ignore[reportMissingTypeArgument]

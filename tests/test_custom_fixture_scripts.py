@@ -8,17 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-import tyro
+from pydrake.geometry import Box, ProximityProperties, Role
+from pydrake.math import RigidTransform
+from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
+from pydrake.systems.framework import DiagramBuilder
 
 from cell import CellConfig, load_product
 from cell.errors import InputError
 from cell.fixtures.base import FixtureError
+from cell.fixtures.custom.work import Work
+from cell.fixtures.rigid_jig import RigidJig
 from cell.vectors import rotation_with_up
-from experiments import fixture_comparison
 from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.custom_fixture import main as write_fixture
-from experiments.fixture_comparison import ComparisonOptions, Row
-from experiments.fixture_comparison import main as compare_fixtures
 from experiments.paper.larger_part import larger
 from experiments.paper.postures import POSTURES
 from experiments.paper.product_postures import postures_of
@@ -72,6 +74,31 @@ def test_exact_grasp_seats_the_part_to_within_its_play(fixture: str, case: str) 
     assert measured["seat_error_rad"] < 1e-3
 
 
+@pytest.mark.parametrize("pieces", [1, 2, 3])
+def test_part_of_any_number_of_contact_pieces_meets_the_nest_with_its_surface_alone(
+    pieces: int,
+) -> None:
+    """The plant's list of them grows when the surface is added to it."""
+    builder = DiagramBuilder()
+    plant, scene_graph = AddMultibodyPlantSceneGraph(builder, 1e-3)
+    mesh = trimesh.creation.box((0.05, 0.04, 0.02))
+    work = Work("box", "+z", mesh, rotation_with_up("+z"), CellConfig().custom)
+    nest = RigidJig(plant, scene_graph, plant.AddRigidBody("base"), work)
+    part = plant.AddRigidBody("body", plant.AddModelInstance("box"))
+    own = [
+        plant.RegisterCollisionGeometry(
+            part, RigidTransform(), Box(0.05, 0.04, 0.02), f"piece_{k}", ProximityProperties()
+        )
+        for k in range(pieces)
+    ]
+    nest.add_part(plant, part, mesh)
+    inspector = scene_graph.model_inspector()
+    names = {inspector.GetName(i): i for i in inspector.GetAllGeometryIds(Role.kProximity)}
+    wall = next(i for name, i in names.items() if name.endswith("wall_0"))
+    assert all(inspector.CollisionFiltered(wall, piece) for piece in own)
+    assert not inspector.CollisionFiltered(wall, names["box::surface"])
+
+
 def test_script_writes_what_has_to_be_made(tmp_path: Path) -> None:
     arguments = ["--part", "plate", "--up=-z", "--quiet", "--out", str(tmp_path)]
     assert write_fixture([*arguments, "--fixture", "support_jig"]) == 0
@@ -90,57 +117,7 @@ def test_scripts_refuse_bad_input(tmp_path: Path, capsys: pytest.CaptureFixture[
     assert "takes any part" in capsys.readouterr().err
     assert write_fixture(["--part", "wheel", *out]) == 2
     assert "Known: bolt_1" in capsys.readouterr().err
-    assert compare_fixtures(["--case", "motor/P9", *out]) == 2
     assert not (tmp_path / "new").exists()
-
-
-@pytest.mark.slow
-def test_comparison_of_one_posture(tmp_path: Path) -> None:
-    arguments = ["--products", "motor_unit", "--case", "plate/P1", "--trials", "1"]
-    arguments += ["--quiet", "--out", str(tmp_path)]
-    assert compare_fixtures(arguments) == 0
-    rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
-    assert [row["refused"] for row in rows] == [""] * 7
-    drawn = {row["fixture"]: row for row in rows if not row["larger_m"]}
-    soft, posts, nest = (drawn[name] for name in ("soft_jig", "support_jig", "rigid_jig"))
-    assert soft["holds"]["force +z"]["load"] > 3 * nest["holds"]["force +z"]["load"]
-    for rigid in (posts, nest):
-        assert 0.6 < rigid["holds"]["force +z"]["load"] < 1.0  # The weight is 0.67 N.
-        assert rigid["holds"]["force +y"]["load"] > soft["holds"]["force +y"]["load"] / 3
-
-
-def test_interrupted_comparison_is_continued(tmp_path: Path, monkeypatch, capsys) -> None:
-    """Rows that are there are kept, also those that were refused; another seed is refused."""
-    made: list[tuple] = []
-
-    def counted(config, wanted, options) -> Row:
-        made.append(wanted.key)
-        if len(made) == 2:
-            raise KeyboardInterrupt
-        return Row(wanted.source, wanted.fixture, wanted.posture.label, wanted.larger, "no")
-
-    monkeypatch.setattr(fixture_comparison, "compare", counted)
-    arguments = [
-        "--products",
-        "motor_unit",
-        "--case",
-        "motor/P1",
-        "--quiet",
-        "--out",
-        str(tmp_path),
-    ]
-    with pytest.raises(KeyboardInterrupt):
-        fixture_comparison.run(options_of(arguments))
-    assert compare_fixtures(arguments) == 0
-    assert len(made) == 8 and len(set(made)) == 7
-    rows = json.loads((tmp_path / "comparison.json").read_text())["rows"]
-    assert [row["larger_m"] for row in rows] == [0.0, 0.0, 1e-4, 3e-4, 0.0, 1e-4, 3e-4]
-    assert compare_fixtures([*arguments, "--seed", "3"]) == 2
-    assert "choose another --out" in capsys.readouterr().err
-
-
-def options_of(arguments: list[str]) -> ComparisonOptions:
-    return tyro.cli(ComparisonOptions, args=arguments)
 
 
 def test_larger_part_has_every_face_moved_outward() -> None:

@@ -62,6 +62,7 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "jig": {"campaigns"},
         "calibration": {"reporting", "campaigns", "jig"},
         "paper": {"reporting", "campaigns", "speed"},
+        "fixtures": {"reporting", "campaigns", "product", "paper"},
         "vision": {"reporting", "paper"},
         "compare": {"reporting", "campaigns"},
         "regress": {"reporting", "campaigns", "speed", "jig", "paper", "compare"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from cell.errors import InputError
 from cell.products.loading import load_product
 from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
@@ -37,7 +38,10 @@ def assemble(task: Task, *, order: str = "", last: str = "") -> Outcome:
         todo = _up_to(steps(product, fixing), last)
     except NoOperation as reason:
         return Outcome(False, phase="plan", evidence=str(reason))
-    config = with_fixture_for(task.config, product, task.seed, todo)
+    try:
+        config = with_fixture_for(task.config, product, task.seed, todo)
+    except InputError as reason:  # It cannot hold what the plan fixes.
+        return Outcome(False, phase="plan", evidence=str(reason))
     run = Run(RunningCell(product, config, task.seed))
     before = _BeforeStep(run)
     run.watchers = (before,)

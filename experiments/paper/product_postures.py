@@ -7,6 +7,7 @@ with jaws that close level.
 
 from __future__ import annotations
 
+from cell.errors import UnknownName
 from cell.products.product import Grasp, Part, Product
 from cell.vectors import rotation_with_up
 from experiments.paper.postures import POSTURES, Posture
@@ -30,6 +31,18 @@ def postures_of(product: Product) -> list[Posture]:
         for part, up, grasp in found
         if grasp is not None
     ]
+
+
+def posture_named(product: Product, label: str) -> Posture:
+    """Return the posture of a product's part with a label, for example "motor/P2" or "post/+z".
+
+    Raises:
+        UnknownName: None of its parts can be placed in one of this label.
+    """
+    known = {posture.label: posture for posture in postures_of(product)}
+    if label not in known:
+        raise UnknownName(f"posture of '{product.name}'", label, known)
+    return known[label]
 
 
 def _grasp(part: Part, up: str) -> Grasp | None:

@@ -12,6 +12,7 @@ from pydrake.math import RigidTransform, RollPitchYaw
 from cell.configuration.config import CellConfig
 from cell.errors import BadPart
 from cell.fixtures import fixture_class
+from cell.fixtures.base import FixtureError
 from cell.fixtures.custom.fixture import CustomFixture
 from cell.machines.cameras.camera import FixedView
 from cell.products.product import Part, Product
@@ -55,6 +56,11 @@ class TrialDisturbance:
         jig = rng.normal(scale=push.jig_position_sigma, size=2)
         seed = int(rng.integers(1 << 20))
         return TrialDisturbance(RigidTransform(RollPitchYaw(angles), offset), jig, seed)
+
+    @staticmethod
+    def none() -> TrialDisturbance:
+        """Return no errors: the part is gripped as planned, the jig where it is believed to be."""
+        return TrialDisturbance(RigidTransform(), np.zeros(2), 0)
 
     def displaced(self, X_WJ: RigidTransform) -> RigidTransform:
         """Return the true pose of a jig whose nominal pose is X_WJ."""
@@ -230,6 +236,15 @@ def check_fits(config: CellConfig, product: Product, posture: Posture) -> None:
             f"it is {1e3 * max(size[:2]):.0f} mm wide in posture {posture.name}, "
             f"the bag's aperture {1e3 * aperture:.0f} mm",
         )
+
+
+def misfit(config: CellConfig, product: Product, posture: Posture) -> str:
+    """Return why the fixture cannot hold a part in a posture; "" if it can."""
+    try:
+        check_fits(config, product, posture)
+    except (BadPart, FixtureError) as reason:
+        return str(reason)
+    return ""
 
 
 Watch = Callable[[str, Observer], None]

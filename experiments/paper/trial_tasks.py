@@ -36,6 +36,8 @@ LOG, FAILED_STATE = "log.npz", "failed_state.npz"
 PICTURES = {"place": ("placed", "end"), "push": ("before", "after", "end")}
 CRITERION = "criterion"
 """The phase in which a trial failed that ran to its end."""
+FIT = "fit"
+"""The phase in which a trial failed whose part the fixture cannot hold at all."""
 
 Arrays = dict[str, np.ndarray]
 

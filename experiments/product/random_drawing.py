@@ -7,11 +7,12 @@ designer would: holes with clearance, screws of standard sizes with thread enoug
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from pathlib import Path
 
 import numpy as np
 from manifold3d import Manifold
 
-from cell.cad.shapes import boss, box, cylinder, hexagon_prism
+from cell.cad.shapes import boss, box, cylinder, hexagon_prism, to_trimesh
 from cell.products.screw_table import SIZES, Head, ScrewSize
 
 FACETS = 64
@@ -65,6 +66,14 @@ def draw(rng: np.random.Generator) -> Drawing:
     elif rng.random() < 0.8:
         _screws(drawing, rng, size, holes)
     return drawing
+
+
+def write_cad(drawing: Drawing, folder: Path) -> Path:
+    """Write the parts of a drawing as STL files in millimetres; return their folder."""
+    folder.mkdir(parents=True, exist_ok=True)
+    for name, solid in drawing.parts.items():
+        to_trimesh(solid).export(folder / f"{name}.stl")
+    return folder
 
 
 @dataclass(frozen=True)
