@@ -20,6 +20,7 @@ from cell.configuration.config import InsertionConfig
 from cell.simulation.conditions import All, Below, FirstOf, Height, Steady, TooMuchForce
 from cell.simulation.phase import Condition, Impedance, Outcome, Phase, after, motion_finished
 from cell.simulation.vocabulary import in_programs
+from planning.operations.bolts import standing_pose
 from planning.operations.grasping import (
     Reach,
     comes_from_above,
@@ -157,6 +158,10 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     )
     yield from _insert(station, mating, X_WGoal, jaw, X_JawP, both)
     yield from let_go(station, part, reach.grasp, RETREAT, both)
+    # Who cannot see a bolt knows it by what it has come to stand on, not by the hand it rode in.
+    for bolt in riders:
+        if bolt in station.cell.product.screws:
+            station.belief.rest(bolt, standing_pose(station, bolt))
 
 
 def foresee_mating(station: Station, mating: Mating) -> None:
