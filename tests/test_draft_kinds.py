@@ -20,9 +20,10 @@ from cell.machines.grippers import HAND_E
 from cell.products.loading import load_product
 from cell.products.product import Part
 from cell.products.read_options import ReadOptions
+from experiments.cli.main import main
 from planning.assembly_plan.planner import plan
 from planning.fixture_analysis.candidate import FixtureSetup
-from planning.product_check.check import plan_findings
+from planning.product_check.check import bed_findings, plan_findings
 from planning.product_check.finding import Level
 from planning.product_draft.bed_reach import bed_reach
 from planning.product_draft.depth_maps import DepthMaps
@@ -195,3 +196,28 @@ def test_screws_and_what_they_clamp_are_borne(tmp_path: Path) -> None:
     found, todo = plan_findings(draft.product, plan(draft.product, config=CONFIG))
     assert todo
     assert not [f for f in found if f.level is Level.FAILS]
+
+
+def turned_base() -> dict[str, Manifold]:
+    """A turned foot with a shaft, and a flange that rests on the foot's shoulder."""
+    foot = cylinder(22.0, 0, 14) + cylinder(7.0, 14, 40)
+    return {"foot": foot, "flange": cylinder(18.0, 14, 22) - cylinder(7.06, 13, 23)}
+
+
+def test_the_bed_holds_a_turned_part_by_its_foot_and_not_by_its_shaft(tmp_path: Path) -> None:
+    draft = draft_product(read(turned_base(), tmp_path), tmp_path / "own", DraftOptions())
+    names = [piece.name for piece in draft.contacts["foot"].pieces]
+    assert sorted(name.rpartition("_")[0] for name in names) == ["bed_boss", "boss"]
+    assert draft.contacts["foot"].error.more < 0.01
+
+
+def test_a_fixed_part_that_the_bed_does_not_touch_is_refused(tmp_path: Path) -> None:
+    """A straight pin that another part comes over: its contact model is the shaft's."""
+    parts = {"pin": cylinder(7.0, 0, 60), "cap": cylinder(12.0, 40, 64) - cylinder(7.06, 39, 60)}
+    source, out = write_meshes(parts, tmp_path / "cad"), tmp_path / "own"
+    order = ["--order", "pin,cap"]
+    assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet", *order]) == 0
+    product = load_product(out / "product.yaml")
+    (refused,) = bed_findings(product, plan(product, config=CONFIG), CONFIG)
+    assert refused.subject == "pin"
+    assert refused.level is Level.FAILS

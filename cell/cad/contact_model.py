@@ -9,7 +9,7 @@ in millimetres inside.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -88,6 +88,7 @@ def contact_model(
     uses: Mapping[int, Use],
     *,
     fixed: bool,
+    shafts: Collection[int] | None = None,
 ) -> ContactModel:
     """Return the contact pieces of a part.
 
@@ -96,6 +97,8 @@ def contact_model(
         cylinders: Its round features, as `cylinders_of` finds them [m].
         uses: By number of a cylinder, what goes into it; all other holes are filled.
         fixed: Whether the fixture holds it: then it is rigid, and named for the bed.
+        shafts: Numbers of the bosses that go into holes; None: all. Others of a part that is held
+            are like the rest of it, such as round feet.
     """
     drawn = to_manifold(mesh.copy().apply_scale(1.0 / MM))
     features = {number: cylinder.scaled(1.0 / MM) for number, cylinder in enumerate(cylinders)}
@@ -122,7 +125,10 @@ def contact_model(
             surface, room = _boss(cylinder, drawn)
             rest = rest - room
             stand_ins.append(to_manifold(surface))
-            pieces.append(Piece(f"boss_{number}", _metres(surface), _metal(), convex=True))
+            in_bed = fixed and shafts is not None and number not in shafts
+            name = f"{'bed_' if in_bed else ''}boss_{number}"
+            metal = Contact(BED_FRICTION) if in_bed else _metal()
+            pieces.append(Piece(name, _metres(surface), metal, convex=True))
     bodies = convex_pieces(rest)
     contact = Contact(BED_FRICTION) if fixed else _metal(BODY_FRICTION)
     shape = to_trimesh(solid)

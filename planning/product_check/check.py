@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from cell.configuration.config import CellConfig
+from cell.fixtures.soft_jig.bed_pieces import bed_pieces
 from cell.machines.arm import Unreachable
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
@@ -61,6 +62,17 @@ def fixture_findings(fixing: FixingPlan, choices: Sequence[Choice]) -> Iterator[
             yield doubtful(step.fixed_part, f"on the jig while {step.item} is added: {rejected}")
     if choices and not said:
         yield good(fixing.steps[0].fixed_part, "the bag holds it, by size, depth and stability")
+
+
+def bed_findings(product: Product, fixing: FixingPlan, config: CellConfig) -> Iterator[Finding]:
+    """Yield the fixed parts of a plan of whose contact models nothing touches the jig's bed."""
+    if config.workcell.fixture != "soft_jig":
+        return
+    for name in dict.fromkeys(step.fixed_part for step in fixing.steps):
+        part, membrane = product.parts[name], config.jig.jammed.friction
+        if part.model is not None and not bed_pieces(part.model, part.mesh, membrane).own:
+            text = "the jig cannot hold it: no piece of its contact model is named bed_..."
+            yield fails(name, f"{text}; a shaft that another part comes over is none")
 
 
 def borne_torques(fixing: FixingPlan, choices: Sequence[Choice]) -> dict[str, float]:
@@ -120,6 +132,7 @@ def simulated_findings(
 
 
 __all__ = [
+    "bed_findings",
     "borne_torques",
     "fixture_choices",
     "fixture_findings",

@@ -190,6 +190,12 @@ def _fit_guess(fit: FitGuess, count: int) -> Guess:
     return Guess(subject, what, f"coaxial shaft and hole{several}", 0.9)
 
 
+def shafts_of(part: str, features: Features) -> set[int]:
+    """Return the numbers of the bosses of a part that holes of others are around."""
+    bosses = [number for number, cylinder in enumerate(features[part]) if not cylinder.hole]
+    return {n for n in bosses if _holes_around(part, features[part][n], features)}
+
+
 @dataclass(frozen=True)
 class _Around:
     """A hole around a shaft: whose, which, how much wider, how far they overlap, its upper end."""
