@@ -85,7 +85,7 @@ def sample_grasps(
     # Held where it is assembled, jaws may close on what is flush with it, too: that holds as well.
     tight = -TIGHT if from_side else TIGHT
     found: list[RankedGrasp] = []
-    for step in (STEP, FINE):
+    for step in (STEP,) if from_side else (STEP, FINE):
         for R in _orientations(mesh, up, from_side):
             maps = DepthMaps.of(mesh, R)
             places, kept = list(_places(mesh, hand, maps, R, step)), 0

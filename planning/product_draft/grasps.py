@@ -64,13 +64,15 @@ def part_grasps(
     rises = sorted({BED_RISE, min(BED_RISE, imprint + IMPRINT_ERROR)}, reverse=True)
     there = {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
 
-    def sampled(around: Mapping[str, fcl.BVHModel], **how: bool) -> list[RankedGrasp]:
+    def sampled(
+        around: Mapping[str, fcl.BVHModel], *, from_side: bool = False
+    ) -> list[RankedGrasp]:
         found: list[RankedGrasp] = []
         for rise in rises:
             obstacles = [surface(_bed(base, up, rise)), *around.values()]
-            lower = sample_grasps(part.mesh, part.mass, hand, up, obstacles, **how)
+            lower = sample_grasps(part.mesh, part.mass, hand, up, obstacles, from_side=from_side)
             found = max(found, lower, key=lambda ranked: ranked[0].score if ranked else -np.inf)
-            if found and found[0].score > POOR:
+            if found and (from_side or found[0].score > POOR):
                 break
         return found
 
