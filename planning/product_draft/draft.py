@@ -182,11 +182,12 @@ def _planned(
     best = plan(product, options.order, config=options.config)
     unknown = unknown_screws(best, screws)
     guesses += [Guess(name, "not taken for a screw", text, 0.7) for name, text in unknown.items()]
-    hints = "".join(f" {name}: {text}." for name, text in unknown.items())
+    # The cause comes first: the rest may be cut off.
+    hints = "".join(f"{name}: {text}. " for name, text in unknown.items())
     if best.stop is not None or best.unplanned:
         reason = "; ".join(f"{item.name} {item.reason}" for item in best.unplanned)
         reason = stop_text(best) if best.stop else reason
-        raise RunFailure(f"No order to assemble '{product.name}': {reason}.{hints}")
+        raise RunFailure(f"{hints}No order to assemble '{product.name}': {reason}.")
     others = best.orders.ranked if best.orders and options.order is None else ()
     for order in (best.order, *(r.order for r in others if r.refixings == 0)):
         found = best if order == best.order else plan(product, order, config=options.config)
@@ -198,8 +199,8 @@ def _planned(
             return found
     names = ", then ".join(dict.fromkeys(step.fixed_part for step in best.steps))
     raise RunFailure(
-        f"Every order of '{product.name}' fixes more than one part, the best {names}: contact "
-        f"models are made for one. --order A,B,C asks for another order.{hints}"
+        f"{hints}Every order of '{product.name}' fixes more than one part, the best {names}: "
+        "contact models are made for one. --order A,B,C asks for another order."
     )
 
 
