@@ -23,7 +23,7 @@ from planning.product_check.drawn_support import support_findings
 from planning.product_check.finding import Finding, Level, doubtful, fails, good
 from planning.product_check.machine_limits import machine_findings
 from planning.product_check.standing_clear import clearance_findings
-from planning.product_check.unknown_screws import unknown_screws
+from planning.product_draft.unknown_screws import unknown_screws
 
 
 def plan_findings(product: Product, fixing: FixingPlan) -> tuple[list[Finding], list[Step]]:

@@ -23,7 +23,6 @@ from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.feasibility.directions import unit_vector
 from planning.fixture_analysis.candidate import FixtureSetup
-from planning.product_check.unknown_screws import unknown_screws
 from planning.product_draft.bed_reach import bed_reach
 from planning.product_draft.contact_models import contact_models
 from planning.product_draft.grasps import part_grasps, screw_grasp
@@ -33,6 +32,7 @@ from planning.product_draft.joint_guesses import ScrewGuess, guess_fits, guess_s
 from planning.product_draft.joints import Joining
 from planning.product_draft.part_models import plain, write_parts, write_tray
 from planning.product_draft.recognised import Recognised, placed
+from planning.product_draft.unknown_screws import unknown_screws
 
 
 @dataclass(frozen=True)
