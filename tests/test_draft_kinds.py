@@ -146,6 +146,10 @@ def test_a_low_hub_is_gripped_above_what_stands_around_the_rest() -> None:
     found = sample_grasps(wheel, 0.01, HAND, UP, [surface(nest)])
     assert found
     assert all(ranked.grasp.width == pytest.approx(13 * MM, abs=0.2 * MM) for ranked in found)
+    # Little of it is touched: pads that are squeezed more than 0.25 mm push it out.
+    for ranked in found:
+        most = 2.5e-4 * HAND.stiffness(ranked.grasp.jaw) * ranked.area
+        assert 5.0 <= ranked.grasp.force < most + 1.0
 
 
 def test_the_bed_reaches_less_far_up_a_wide_base_than_up_a_narrow_one() -> None:
