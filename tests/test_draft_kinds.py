@@ -5,6 +5,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 from drawn_products import covered_block, meshes, screw, write_meshes
 from manifold3d import Manifold
 from pydrake.geometry import Box
@@ -14,6 +15,7 @@ from cell.cad.motor_unit import mesh
 from cell.cad.nests import stop_nest
 from cell.cad.round_features import cylinders_of
 from cell.cad.shapes import box, cone, cylinder, hexagon_prism
+from cell.cad.slivers import LEAST_FACE, without_slivers
 from cell.configuration.config import CellConfig
 from cell.errors import RunFailure
 from cell.machines.grippers import HAND_E
@@ -169,6 +171,23 @@ def test_a_thin_base_is_gripped_just_above_the_bed() -> None:
     assert part_grasps(part, HAND, UP, base=base, earlier={}, nest=nest)[0] == []
     reach = bed_reach(base, "+z", FixtureSetup.of(CONFIG))
     assert part_grasps(part, HAND, UP, base=base, earlier={}, nest=nest, imprint=reach)[0]
+
+
+# Contact.
+
+
+def test_corners_a_micrometre_apart_become_one() -> None:
+    """Drake takes no normal from a face of 1e-12 m2: the run would end."""
+    corners = np.array([[x, y, z] for x in (0.0, 4.0) for y in (0.0, 3.0) for z in (0.0, 2.0)])
+    # The last corner is cut off by a micrometre.
+    doubled = np.concatenate([corners[:-1], corners[-1] - 1e-3 * np.eye(3)])
+    piece = trimesh.convex.convex_hull(doubled)
+    assert piece.area_faces.min() < 1e-5
+    mended = without_slivers(piece)
+    assert mended.area_faces.min() > LEAST_FACE
+    assert mended.volume == pytest.approx(24.0, rel=0.01)
+    whole = trimesh.convex.convex_hull(corners)
+    assert without_slivers(whole) is whole
 
 
 # What is drawn.

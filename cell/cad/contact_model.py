@@ -31,6 +31,7 @@ from cell.cad.motor_unit import (
 from cell.cad.round_features import Cylinder
 from cell.cad.sdf import Contact, Piece
 from cell.cad.shapes import convex_revolve, joined, open_band, to_trimesh
+from cell.cad.slivers import without_slivers
 
 EDGE_BREAK = 0.3  # [A] Deburred edge where the CAD draws a sharp one; less on short fits [mm].
 INSET = 0.1  # The wall of a hole ends this far before both faces [mm] [D].
@@ -136,7 +137,8 @@ def contact_model(
         if not fixed:
             body = with_broken_edges(body, shape)
         name = f"{'bed' if fixed else 'body'}_{number}"
-        pieces.append(Piece(name, _metres(to_trimesh(body)), contact, convex=True))
+        surface = without_slivers(to_trimesh(body))
+        pieces.append(Piece(name, _metres(surface), contact, convex=True))
     # The walls of used holes are exact, and what their windows leave out touches nothing.
     windows = sum((_window(c, uses[n], 4) for n, c in used.items()), Manifold())
     error = error_of([*bodies, *stand_ins], solid, but=windows)
