@@ -37,6 +37,9 @@ class Coming:
     jaws: np.ndarray
 
 
+# [A] Of the holder's first joint from home, where it waits, tried in this order [rad].
+PARK_TURNS = np.deg2rad([0.0, -30.0, 30.0, -60.0, 60.0])
+
 # What another arm does while the holder moves.
 Meanwhile = Callable[[Coming], Mapping[str, Command]]
 
@@ -51,7 +54,11 @@ class HoldPhase(Enum):
 
 
 def hold(
-    station: Station, part: str, meanwhile: Meanwhile, suits: Callable[[Reach], bool]
+    station: Station,
+    part: str,
+    meanwhile: Meanwhile,
+    suits: Callable[[Reach], bool],
+    clear_at: Callable[[np.ndarray], bool],
 ) -> Generator[Phase, Outcome, Grasp | None]:
     """Yield the phases with which the hand grips an assembled part; return the grasp.
 
@@ -64,11 +71,12 @@ def hold(
         part: Name of the part.
         meanwhile: What the driver does beside it.
         suits: Whether the driver reaches the bolts beside the hand.
+        clear_at: Whether the driver reaches them while the holder is at joint angles (n,) [rad].
     """
     arm, gripper = station.holder, station.cell.gripper
     reach = next(filter(suits, from_the_side(station, part)), None)
     if reach is None:
-        yield from park(station, meanwhile)
+        yield from park(station, meanwhile, clear_at)
         return None
     motion = station.move(arm, reach.q_before, [(station.hand, part)])
     jaw = opened(gripper.model, reach.grasp)
@@ -106,15 +114,32 @@ def from_the_side(station: Station, part: str) -> Iterator[Reach]:
     return reachable_grasps(station, part, X_WP, grasps)
 
 
-def park(station: Station, meanwhile: Meanwhile) -> Iterator[Phase]:
-    """Yield the phase that takes the holder home, out of the driver's way."""
+def parking(station: Station, clear_at: Callable[[np.ndarray], bool]) -> np.ndarray:
+    """Return joint angles (n,) of the holder that leave the driver room; home if none do [rad].
+
+    It goes home, or turns further away about its base. Arguments as of `hold`.
+    """
     arm = station.holder
-    motion = station.move(arm, arm.home)
+    for turn in PARK_TURNS:
+        q = arm.home.copy()
+        q[0] += turn
+        station.model.arrange(station.surroundings())
+        if station.model.is_free(arm.name, q) and clear_at(q):
+            return q
+    return arm.home
+
+
+def park(
+    station: Station, meanwhile: Meanwhile, clear_at: Callable[[np.ndarray], bool]
+) -> Iterator[Phase]:
+    """Yield the phase that takes the holder out of the driver's way; arguments as of `hold`."""
+    arm, q_park = station.holder, parking(station, clear_at)
+    motion = station.move(arm, q_park)
     jaws = station.cell.plant.GetPositions(station.context, arm.tool_instance)
     yield Phase(
         HoldPhase.PARK,
         motion_finished,
         20.0,
         subject=f"{arm.name} arm",
-        commands={arm.name: motion, **meanwhile(Coming(motion, arm.home, jaws))},
+        commands={arm.name: motion, **meanwhile(Coming(motion, q_park, jaws))},
     )

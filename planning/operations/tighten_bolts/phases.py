@@ -27,7 +27,7 @@ from cell.simulation.phase import (
 )
 from cell.simulation.vocabulary import in_programs
 from planning.motion.paths import NoPath
-from planning.operations.counter_hold import Coming, from_the_side, hold, park
+from planning.operations.counter_hold import Coming, from_the_side, hold, park, parking
 from planning.operations.grasping import Reach, backed_off, let_go, opened, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
@@ -41,6 +41,7 @@ SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to i
 FEED_RESERVE = 0.003  # The feed can follow the bolt this far beyond its engaged length [m] [A].
 STOP_TIME = 0.05  # Of the spindle [s] [A].
 REST_TIME = 0.2  # [s] [A]
+MOST_MET = 2  # [A] Collisions that are told of.
 RETREAT = 0.05  # Of the gripper from what it held [m] [A].
 
 
@@ -144,13 +145,16 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     def leaves_room(reach: Reach) -> bool:
         return _leaves_room(station, order, reach)
 
+    def clear_at(q: np.ndarray) -> bool:
+        return _clear_at(station, order, q)
+
     if station.config.driver.counter_hold:
-        grasp = yield from hold(station, clamped, meanwhile, leaves_room)
+        grasp = yield from hold(station, clamped, meanwhile, leaves_room, clear_at)
         yield from _tighten_all(station, order)
         if grasp is not None:
             yield from let_go(station, clamped, grasp, RETREAT, assembly)
     else:
-        yield from park(station, meanwhile)
+        yield from park(station, meanwhile, clear_at)
         yield from _tighten_all(station, order)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
     yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
@@ -162,7 +166,8 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
     holds = station.config.driver.counter_hold
     if holds and any(_leaves_room(station, step.parts, r) for r in from_the_side(station, clamped)):
         return ()
-    away = {station.holder.name: station.holder.home}
+    q_park = parking(station, lambda q: _clear_at(station, step.parts, q))
+    away = {station.holder.name: q_park}
     for bolt in step.parts:
         if not is_reached(station, bolt, away):
             _above(station, bolt, away)  # Raises what is said of it.
@@ -170,6 +175,11 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
         return ()
     alone = "leaves room for the driver: the jig alone bears the torque"
     return (f"no grasp of '{clamped}' from the side {alone}",)
+
+
+def _clear_at(station: Station, bolts: Sequence[str], q: np.ndarray) -> bool:
+    """Return whether the driver reaches bolts while the holder is at joint angles (n,) [rad]."""
+    return all(is_reached(station, bolt, {station.holder.name: q}) for bolt in bolts)
 
 
 def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
@@ -313,7 +323,11 @@ def _above(
     found = list(ways_above(station, bolt, elsewhere))
     if not found:
         X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
-        reason = "no turn of the driver keeps clear there"
+        reason = "out of reach, however the driver is turned"
+        solutions = driver.configurations(station.context, driver.frame("tool_tip"), X_WE, near)
+        if solutions:
+            met = station.model.collisions(driver.name, solutions[0])
+            reason = f"no turn of the driver keeps clear: {'; '.join(met[:MOST_MET])}"
         raise Unreachable(driver.name, "tool_tip", X_WE, reason)
     return min(found, key=lambda q: float(np.max(np.abs(q - near))))
 
