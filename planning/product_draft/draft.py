@@ -108,6 +108,8 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
         if name in seen.screw_named:
             gripped[name] = replace(part, grasps=(screw_grasp(seen.screw_named[name]),))
             continue
+        own = [screw for screw in screws if name in (screw.clamps, screw.into)]
+        there = set().union(*(seen.before(screw.part) for screw in own)) - {name}
         grasps, more = part_grasps(
             part,
             hand,
@@ -116,7 +118,8 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
             earlier={other: meshes[other] for other in sorted(seen.before(name))},
             nest=nests[name][1],
             imprint=imprint,
-            screws=[screw for screw in screws if screw.clamps == name],
+            screws=own,
+            beside={other: meshes[other] for other in sorted(there - set(seen.screw_named))},
             apart=options.config.motion.arm_clearance,
         )
         guesses += more

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
 import fcl
 import numpy as np
@@ -45,6 +46,7 @@ def part_grasps(
     nest: Nest,
     imprint: float = BED_RISE,
     screws: Sequence[ScrewGuess] = (),
+    beside: Mapping[str, trimesh.Trimesh] = MappingProxyType({}),
     apart: float = 0.0,
 ) -> tuple[list[Grasp], list[Guess]]:
     """Return the grasps of a part, from above and, if it is held while screwed, from the side.
@@ -57,12 +59,13 @@ def part_grasps(
         earlier: By name, what is there when it is put, in A [m].
         nest: Its place in the tray.
         imprint: How far the bed reaches up the base by the planner's imprint [m].
-        screws: That clamp it: it is held from the side, beside the driver, while they are driven.
+        screws: It is held from the side, beside the driver, while they are driven: those that clamp
+            it, or go into it.
+        beside: By name, what is there then, in A [m].
         apart: Distance kept between the arms [m].
     """
     assert part.X_TrayP is not None
     rises = sorted({BED_RISE, min(BED_RISE, imprint + IMPRINT_ERROR)}, reverse=True)
-    there = {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
 
     def sampled(
         around: Mapping[str, fcl.BVHModel], *, from_side: bool = False
@@ -76,17 +79,19 @@ def part_grasps(
                 break
         return found
 
-    around = {"its nest": surface(_nest_in_part(nest, part.X_TrayP)), **there}
+    around = {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
+    around["its nest"] = surface(_nest_in_part(nest, part.X_TrayP))
     above = sampled(around)
     bed = {"the bed": surface(_bed(base, up, rises[-1]))}
     why = "" if above else why_no_grasp(part.mesh, part.mass, hand, up, {**bed, **around})
     guesses = [_guess(part.name, above, "from above", why)]
     side: list[RankedGrasp] = []
     if screws:
+        there = {f"'{name}'": surface(mesh) for name, mesh in beside.items()}
         there["the driver"] = surface(joined([_driver_over(screw, apart) for screw in screws]))
         side = sampled(there, from_side=True)
         # No more is said of why there is none: the fixture alone holds it then.
-        how = "from the side, while it is screwed down"
+        how = "from the side, while screws are driven"
         guesses.append(_guess(part.name, side, how, "nothing fits between what is around"))
     return [ranked.grasp for ranked in (*above, *side)], guesses
 

@@ -1,8 +1,9 @@
 """The phases that drive standing bolts home in star order.
 
 The driver comes down on one head after another: bit into socket, thread caught, run down, seated,
-tightened until the clutch trips. The gripper holds the clamped part meanwhile, or is out of the
-way. Screws that ask for two passes are all tightened to half their torque first.
+tightened until the clutch trips. The gripper holds against it meanwhile, by the clamped part or by
+the one that the thread is in, or is out of the way. Screws that ask for two passes are all
+tightened to half their torque first.
 """
 
 from __future__ import annotations
@@ -149,10 +150,10 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
         return _clear_at(station, order, q)
 
     if station.config.driver.counter_hold:
-        grasp = yield from hold(station, clamped, meanwhile, leaves_room, clear_at)
+        held = yield from hold(station, holdable(station, step), meanwhile, leaves_room, clear_at)
         yield from _tighten_all(station, order)
-        if grasp is not None:
-            yield from let_go(station, clamped, grasp, RETREAT, assembly)
+        if held is not None:
+            yield from let_go(station, *held, RETREAT, assembly)
     else:
         yield from park(station, meanwhile, clear_at)
         yield from _tighten_all(station, order)
@@ -162,9 +163,9 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
 
 def foresee(station: Station, step: Step) -> tuple[str, ...]:
     """See whether the driver reaches every bolt, beside the hand that holds against it."""
-    clamped = station.cell.product.screws[step.parts[0]].clamps
-    holds = station.config.driver.counter_hold
-    if holds and any(_leaves_room(station, step.parts, r) for r in from_the_side(station, clamped)):
+    parts, holds = holdable(station, step), station.config.driver.counter_hold
+    sides = from_the_side(station, parts) if holds else ()
+    if any(_leaves_room(station, step.parts, reach) for _, reach in sides):
         return ()
     q_park = parking(station, lambda q: _clear_at(station, step.parts, q))
     away = {station.holder.name: q_park}
@@ -174,7 +175,17 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
     if not holds:
         return ()
     alone = "leaves room for the driver: the jig alone bears the torque"
-    return (f"no grasp of '{clamped}' from the side {alone}",)
+    either = " or ".join(f"'{part}'" for part in parts)
+    return (f"no grasp of {either} from the side {alone}",)
+
+
+def holdable(station: Station, step: Step) -> tuple[str, str]:
+    """Return the parts by which the hand may hold against the driver: best the one under the heads.
+
+    The torque of a head goes into what it clamps; the part with the thread takes it from there.
+    """
+    screw = station.cell.product.screws[step.parts[0]]
+    return screw.clamps, screw.into
 
 
 def _clear_at(station: Station, bolts: Sequence[str], q: np.ndarray) -> bool:
