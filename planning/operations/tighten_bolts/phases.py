@@ -33,7 +33,7 @@ from planning.operations.grasping import Reach, backed_off, let_go, opened, rais
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
-from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed
+from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed, seat_speed
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
@@ -274,12 +274,16 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
             mating=frozenset() if clamped else mating,
         )
         station.driven += (bolt,)
+    torque = kinds.share * screw.torque
     yield Phase(
         kinds.tighten,
-        Clutch(spindle, kinds.share * screw.torque),
-        timeout=5.0,
+        Clutch(spindle, torque),
+        timeout=10.0,
         subject=bolt,
-        commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
+        commands={
+            driver.name: feed,
+            spindle: Spin(seat_speed(screw, torque, config.driver.seat_speed)),
+        },
         awake=awake,
         mating=mating,
         fine_log=True,
