@@ -274,15 +274,14 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
             mating=frozenset() if clamped else mating,
         )
         station.driven += (bolt,)
-    torque = kinds.share * screw.torque
     yield Phase(
         kinds.tighten,
-        Clutch(spindle, torque),
+        Clutch(spindle, kinds.share * screw.torque),
         timeout=10.0,
         subject=bolt,
         commands={
             driver.name: feed,
-            spindle: Spin(seat_speed(screw, torque, config.driver.seat_speed)),
+            spindle: Spin(seat_speed(screw, config.driver.seat_speed)),
         },
         awake=awake,
         mating=mating,

@@ -18,9 +18,10 @@ CLUTCH_TIME = 0.002  # The clutch does not feel shorter shocks [s] [A].
 # Turn from snug to tight of a joint that the whole speed suits [rad] [M]: M3, 0.5 N m, which ends
 # 2 % above its torque.
 SOFT_TURN = 0.1
+SLOWEST = 1.0  # [rad/s] [A]: the last quarter of a millimetre takes seconds.
 
 
-def seat_speed(screw: Screw, torque: float, fastest: float) -> float:
+def seat_speed(screw: Screw, fastest: float) -> float:
     """Return the speed of the spindle while a screw is tightened [rad/s].
 
     A stiff joint is tight within a few degrees: in the time in which the clutch feels that a torque
@@ -28,13 +29,12 @@ def seat_speed(screw: Screw, torque: float, fastest: float) -> float:
 
     Args:
         screw: What is tightened.
-        torque: To which it is [N m].
         fastest: Of the spindle near a seat [rad/s].
     """
-    force = torque / (screw.nut_factor * screw.diameter)
+    force = screw.torque / (screw.nut_factor * screw.diameter)
     stretch = force / head_stiffness(1e3 * screw.diameter)
     turn = 2.0 * np.pi * stretch / screw.pitch
-    return fastest * min(1.0, turn / SOFT_TURN)
+    return min(fastest, max(SLOWEST, fastest * turn / SOFT_TURN))
 
 
 @in_programs
