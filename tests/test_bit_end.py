@@ -4,9 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform, RotationMatrix
 from thread_rig import BOLT, ThreadRig
 
+from cell import Cell, Simulation
+from cell.simulation.state import restore_state, save_state
+
 FIND_SPEED = 3.0  # [rad/s]
+STEPS = 5
 DEEP = 1.8e-3  # From the top of the M3 head to the bit's end when it is in [m].
 
 
@@ -45,14 +50,30 @@ def test_bit_over_the_socket_goes_in_untouched() -> None:
     assert abs(rig.driver.push(rig.context)) < 0.05
 
 
-def test_what_touches_is_restored() -> None:
+def test_what_touches_is_restored(motor_unit_cell: Cell) -> None:
     """Also in the depth of a socket, where the shape would be inside of the head."""
-    rig = ThreadRig()
-    lowered(rig, 2e-4, 0.0)
-    rows, p = rig.threads.save(rig.root), rig.p_WE.copy()
-    rig.put_bit(p + [0.02, 0.0, 0.02])
-    rig.step()
-    rig.put_bit(p)
-    rig.threads.restore(rig.root, rows)
-    rig.step()
-    assert abs(rig.driver.push(rig.context)) < 0.05
+    simulation = in_a_socket(motor_unit_cell)
+    state, velocities = save_state(simulation), []
+    for _ in range(2):
+        simulation.step()
+        velocities.append(motor_unit_cell.plant.GetVelocities(simulation.context).copy())
+        simulation = Simulation(motor_unit_cell)
+        restore_state(simulation, state)
+    np.testing.assert_array_equal(*velocities)
+    # Nothing but its weight has moved the bolt.
+    fall = motor_unit_cell.parts[BOLT].velocity(simulation.context)
+    np.testing.assert_allclose(fall, [0.0, 0.0, 0.0, 0.0, 0.0, -9.81 * STEPS * 1e-3], atol=1e-6)
+
+
+def in_a_socket(cell: Cell) -> Simulation:
+    """Return a run in which a bolt falls off the bit that is in its socket, and does not turn."""
+    simulation = Simulation(cell)
+    X_WE = cell.screwdriver.bit_frame.CalcPoseInWorld(simulation.context)
+    seat = cell.product.screws[BOLT].bit_seat
+    X_EF = RigidTransform(RotationMatrix.MakeXRotation(np.pi), [0.0, 0.0, seat])
+    cell.parts.sleep_all_but(simulation.root, [BOLT])
+    cell.plant.SetFreeBodyPose(simulation.context, cell.parts[BOLT].body, X_WE @ X_EF)
+    cell.threads.meet_heads(simulation.root)
+    for _ in range(STEPS):
+        simulation.step()
+    return simulation

@@ -106,7 +106,7 @@ class Threads(LeafSystem):
         """Bring the ties of a new Context in line with what is remembered: Drake has all closed."""
         for bolt, engagement in self.engagements(root).items():
             self._threads[bolt].apply(root, engagement)
-        self._meet_heads(root)
+        self.meet_heads(root)
 
     def set(self, root: Context, bolt: str, engagement: Engagement) -> None:
         """Put one thread into a state; the positions are left as they are."""
@@ -117,7 +117,7 @@ class Threads(LeafSystem):
         """Apply the rules, after a step of the plant."""
         if self._driver is None or not self._threads:
             return
-        self._meet_heads(root)
+        self.meet_heads(root)
         rows = self._rows(root)
         turning = self._driver.drive.commanded_speed(root) != 0.0
         busy = (rows[:, 0] == STATES.index(ThreadState.CAUGHT)) | (rows[:, 1] != NO_BIT)
@@ -143,7 +143,7 @@ class Threads(LeafSystem):
                 self._threads[bolt].set_bit(root, NO_BIT)
                 self._remember(root, bolt, replace(row, bit_position=NO_BIT))
 
-    def _meet_heads(self, root: Context) -> None:
+    def meet_heads(self, root: Context) -> None:
         """Let the bit's end touch what it meets, but for the head whose drive it is over or in."""
         if self._bit_end is None:
             return
@@ -191,10 +191,9 @@ class Threads(LeafSystem):
         return self._rows(root)
 
     def restore(self, root: Context, rows: np.ndarray) -> None:
-        """Undo `save`; the positions are restored with the plant's."""
+        """Undo `save`; the positions are restored with the plant's, `meet_heads` is to follow."""
         for bolt, row in zip(self._threads, rows, strict=True):
             self.set(root, bolt, Engagement.of(row))
-        self._meet_heads(root)
 
 
 def add_threads(
