@@ -14,7 +14,16 @@ from teleport import phases_of, sensed_in
 from cell import Cell, CellConfig, Simulation, load_product
 from cell.machines.driver import DriverReading
 from cell.machines.gripper import GripperReading
-from cell.simulation.conditions import All, Below, Height, PushesBack, Signal, Steady, WristForce
+from cell.simulation.conditions import (
+    All,
+    Below,
+    BitPushedIn,
+    Height,
+    PushesBack,
+    Signal,
+    Steady,
+    WristForce,
+)
 from cell.simulation.phase import (
     Follow,
     Jaw,
@@ -141,6 +150,7 @@ def test_what_a_condition_waits_for_is_said(running: RunningCell) -> None:
     for condition, words in (
         (PushesBack("left", 20.0), "the left arm is pushed up with 0.0 N, not with 20 N"),
         (Signal("fixture fixed"), "no signal 'fixture fixed'"),
+        (BitPushedIn(driver, 12.0), "the bit is pushed in with 10.0 N, not with 12 N"),
         (Clutch(driver, 2.0), "the spindle turns with 0.69 N m, not with 2 N m"),
         (Below(Height(tip), height - 0.004), "the tip is 4.00 mm too high"),
         (Steady(WristForce("left"), 0.2, 0.03), ""),

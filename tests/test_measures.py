@@ -32,6 +32,7 @@ from planning.operations.tighten_bolts.measures import (
     trip,
 )
 from planning.operations.tighten_bolts.phases import DrivePhase
+from planning.operations.tighten_bolts.search import SearchPhase
 
 PRODUCT = load_product("motor_unit")
 SEATED = mating_of(PRODUCT, Step("insert plate", INSERT_SHAFT, ("plate",), PRODUCT.fits[0]))
@@ -241,6 +242,18 @@ def test_what_remains_is_read_while_the_bolt_is_awake() -> None:
     record.phases["plate", HandPhase.RETREAT] = PhaseRecord(late, asleep, {})
     assert record.last_awake("bolt_1") is late
     assert record.last_awake("plate") is None
+
+
+def test_places_at_which_a_socket_was_searched_for_are_counted() -> None:
+    step = Step("tighten bolts", TIGHTEN_BOLTS, ("bolt_1", "bolt_2", "bolt_3"))
+    record = StepRecord(step, snapshot())
+    record.end = snapshot()
+    for bolt in ("bolt_1", "bolt_2"):
+        record.phases[bolt, DrivePhase.BIT_IN] = PhaseRecord(snapshot(), snapshot(), {})
+    searched = PhaseRecord(snapshot(), snapshot(), {}, times=7)
+    record.phases["bolt_2", SearchPhase.DOWN] = searched
+    measured = TIGHTEN_BOLTS.measure(cast(Cell, SimpleNamespace(product=PRODUCT)), record, {})
+    assert measured == {"bolt_1/socket_searches": 0.0, "bolt_2/socket_searches": 7.0}
 
 
 def test_loose_bolt_is_judged_in_the_hole_of_what_it_clamps() -> None:

@@ -18,6 +18,7 @@ from cell.monitor import Monitor, StepCounter
 from cell.paths import model_url, new_parser
 from cell.products.joints import BIT_SEAT
 from cell.products.product import Product
+from cell.workpieces.bit_end import BitEnd
 from cell.workpieces.thread import add_thread, set_head_friction
 from cell.workpieces.threads import Threads
 
@@ -65,13 +66,16 @@ class ThreadRig:
         X_AH = self.product.parts[BOLT].X_AP
         self.bit = self.driver.bit_frame
         set_head_friction(self.plant, scene_graph, self.screw, self.bolt, self.plate)
+        head_height = float(self.product.parts[BOLT].mesh.bounds[1][2])
         self.thread = add_thread(
-            self.plant, scene_graph, self.screw, self.bolt, self.motor, X_AH, self.bit
+            self.plant, scene_graph, self.screw, self.bolt, self.motor, X_AH, self.bit, head_height
         )
+        bit_end = BitEnd.add(self.plant, scene_graph, self.bit)
         self.plant.Finalize()
         self.feed.connect(builder, self.plant, self.carriage)
         drive.connect(builder, self.plant, tool)
-        self.threads = builder.AddNamedSystem("threads", Threads({BOLT: self.thread}, self.driver))
+        threads = Threads({BOLT: self.thread}, self.driver, bit_end)
+        self.threads = builder.AddNamedSystem("threads", threads)
         self.simulator = Simulator(builder.Build())
         self.simulator.set_monitor(Monitor(counter, self.threads.install, [self.threads]))
         self.root = self.simulator.get_mutable_context()

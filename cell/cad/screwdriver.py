@@ -3,8 +3,9 @@
 The gripper that holds the driver never opens, so it and the housing are one rigid ``body``. The
 bit holder floats on two lateral slides and one axial slide with springs, like the heads of
 screwdriving robots; the ``bit`` turns in it on ``spindle_joint`` about +z of ``mount``. The last
-10 mm of the bit have no collision shape: bit and socket are joined by a constraint when they meet
-within their tolerances, and contact of the hex inside the socket would push the bolt around.
+10 mm of the bit have no collision shape here: bit and socket are joined by a constraint when they
+meet within their tolerances, and contact of the hex inside the socket would push the bolt around.
+The cell adds one that is switched off there (``cell.workpieces.bit_end``).
 
 Sources: lengths and masses [A], chosen so that the bit passes between bolt heads and motor shaft;
 hex size 2.5 mm for M3 [R ISO 4762]. All lengths in metres.

@@ -164,6 +164,12 @@ class DriverConfig:
         "[A] 10, plausible 5-15.",
         above=0.0, at_most=50.0,
     )  # fmt: skip
+    search_radius: float = setting(
+        1.5e-3, "m", "How far from where a bolt is believed to stand its socket is searched for, "
+        "at least; where three standard deviations of the belief are more, as far as these.",
+        "[A] A bolt may stand 1 mm off its thread (standing_lateral_m); as much as insertion.",
+        at_least=0.0, at_most=0.01,
+    )  # fmt: skip
     counter_hold: bool = setting(
         True, "", "Whether the gripper holds the clamped part against the torque; else the jig "
         "alone.",

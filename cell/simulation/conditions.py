@@ -120,6 +120,24 @@ class PushesBack:
 
 @in_programs
 @dataclass(frozen=True)
+class BitPushedIn:
+    """The bit pushes the spring of a driver's bit holder in with a force [N]."""
+
+    driver: str
+    force: float
+
+    def __call__(self, sensed: Sensed) -> bool:
+        """Return whether it does."""
+        return sensed.drivers[self.driver].push >= self.force
+
+    def missing(self, sensed: Sensed) -> str:
+        """Return what it is waiting for."""
+        push = sensed.drivers[self.driver].push
+        return f"the bit is pushed in with {push:.1f} N, not with {self.force:g} N"
+
+
+@in_programs
+@dataclass(frozen=True)
 class Below:
     """A point of a tool is lower than a height over W [m]; ``otherwise``: what it means if not."""
 

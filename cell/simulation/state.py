@@ -108,6 +108,7 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     cell.sleeper.restore(root, state["sleep"], root.get_time())
     cell.plant.SetPositions(context, state["q"])
     cell.plant.SetVelocities(context, state["v"])
+    cell.threads.meet_heads(root)
     cell.links.restore(root, state["links"])
     simulation.simulator.Initialize()
 

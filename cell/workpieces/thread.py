@@ -7,6 +7,7 @@ advances one pitch per turn and carries axial force through the joint, whose rea
 force.
 Three more ball constraints tie the bolt to the bit while it is engaged. Both ties are gated: the
 measured axial, lateral, tilt and phase errors must be small first, so nothing is pulled into place.
+A bit that is not over the drive of a bolt meets its head: see `cell.workpieces.bit_end`.
 
 When they close and open is decided in `cell.workpieces.threads`.
 
@@ -152,9 +153,13 @@ class Thread:
 
     Frames: H is the thread frame, where the bolt's frame F is when it is seated; E is the frame
     of the bit's end face.
+
+    Attributes:
+        head_height: Of the top of the head above its underside [m].
     """
 
     screw: Screw
+    head_height: float
     plant: MultibodyPlant
     scene_graph: SceneGraph
     bolt: RigidBody
@@ -186,6 +191,18 @@ class Thread:
         ]
         position = int(np.argmin([abs(fit.angle) for fit in fits]))
         return fits[position], position
+
+    def takes_bit(self, context: Context) -> bool:
+        """Return whether the bit's end is over the drive or in it, however it is turned.
+
+        Of a bit in the drive only its depth is asked: the walls keep it there.
+        """
+        X_FE = self.bit_frame.CalcPose(context, self.bolt.body_frame())
+        misfit = Misfit.between(_X_FE_seated(self.screw, 0).inverse() @ X_FE)
+        below_top = self.head_height - self.screw.bit_seat + misfit.axial
+        if below_top > BIT_GATE.axial and misfit.lateral <= 2 * BIT_GATE.lateral:
+            return True
+        return misfit.lateral <= BIT_GATE.lateral and misfit.tilt <= BIT_GATE.tilt
 
     def thread_misfit(self, context: Context) -> tuple[Misfit, float]:
         """Return the bolt's error against the helix, and the follower angle that fits best."""
@@ -297,6 +314,7 @@ def add_thread(
     into: RigidBody,
     X_IH: RigidTransform,
     bit_frame: Frame,
+    head_height: float,
 ) -> Thread:
     """Add the follower and the (open) ties of one screw, before the plant is finalized.
 
@@ -308,6 +326,7 @@ def add_thread(
         into: The part that carries the thread.
         X_IH: Thread frame H in the frame of ``into``: the bolt's pose when seated.
         bit_frame: Frame E at the bit's end face, +z out of the tool.
+        head_height: Of the top of the head above its underside [m].
     """
     name = f"thread_{screw.part}"
     H = plant.AddFrame(FixedOffsetFrame(name, into.body_frame(), X_IH))
@@ -339,5 +358,15 @@ def add_thread(
         for position in range(screw.drive.positions)
     )
     return Thread(
-        screw, plant, scene_graph, bolt, follower, joint, H, bit_frame, thread_tie, bit_ties
+        screw,
+        head_height,
+        plant,
+        scene_graph,
+        bolt,
+        follower,
+        joint,
+        H,
+        bit_frame,
+        thread_tie,
+        bit_ties,
     )

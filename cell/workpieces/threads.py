@@ -1,8 +1,9 @@
 """When threads catch and lock, and when the bit is in a socket: rules applied after every step.
 
-A bit that is told to turn engages in a socket that it meets; a turned bolt that meets the helix is
-caught; a caught bolt that nothing drives is locked by its static friction; a bit that is told to
-stand leaves the socket once the bit holder's spring does not push it in any more.
+A bit beside a socket stands on the head. One that is told to turn engages in a socket that it
+meets; a turned bolt that meets the helix is caught; a caught bolt that nothing drives is locked by
+its static friction; a bit that is told to stand leaves the socket once the bit holder's spring does
+not push it in any more.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ from pydrake.systems.framework import Context, LeafSystem
 from cell.errors import UnknownName
 from cell.machines.driver import Driver
 from cell.products.product import Product
+from cell.workpieces.bit_end import BitEnd
 from cell.workpieces.parts import Parts
 from cell.workpieces.thread import (
     BIT_GATE,
@@ -38,14 +40,18 @@ class Threads(LeafSystem):
     Args:
         threads: By the name of the bolt.
         driver: Whose bit drives them; None: nothing does.
+        bit_end: What of the bit touches their heads; None without a driver.
     """
 
-    def __init__(self, threads: Mapping[str, Thread], driver: Driver | None) -> None:
+    def __init__(
+        self, threads: Mapping[str, Thread], driver: Driver | None, bit_end: BitEnd | None
+    ) -> None:
         super().__init__()
-        self._threads, self._driver = dict(threads), driver
+        self._threads, self._driver, self._bit_end = dict(threads), driver, bit_end
         self._row_of = {bolt: row for row, bolt in enumerate(self._threads)}
         rows = [Engagement().row() for _ in threads]
         self._index = self.DeclareDiscreteState(np.array(rows).reshape(-1))
+        self._touching = self.DeclareDiscreteState([1.0])  # Whether the bit's end touches.
 
     def __getitem__(self, bolt: str) -> Thread:
         if bolt not in self._threads:
@@ -100,6 +106,7 @@ class Threads(LeafSystem):
         """Bring the ties of a new Context in line with what is remembered: Drake has all closed."""
         for bolt, engagement in self.engagements(root).items():
             self._threads[bolt].apply(root, engagement)
+        self.meet_heads(root)
 
     def set(self, root: Context, bolt: str, engagement: Engagement) -> None:
         """Put one thread into a state; the positions are left as they are."""
@@ -110,6 +117,7 @@ class Threads(LeafSystem):
         """Apply the rules, after a step of the plant."""
         if self._driver is None or not self._threads:
             return
+        self.meet_heads(root)
         rows = self._rows(root)
         turning = self._driver.drive.commanded_speed(root) != 0.0
         busy = (rows[:, 0] == STATES.index(ThreadState.CAUGHT)) | (rows[:, 1] != NO_BIT)
@@ -134,6 +142,21 @@ class Threads(LeafSystem):
             ):
                 self._threads[bolt].set_bit(root, NO_BIT)
                 self._remember(root, bolt, replace(row, bit_position=NO_BIT))
+
+    def meet_heads(self, root: Context) -> None:
+        """Let the bit's end touch what it meets, but for the head whose drive it is over or in."""
+        if self._bit_end is None:
+            return
+        touches = not (self._rows(root)[:, 1] != NO_BIT).any()
+        for thread in self._threads.values() if touches else ():
+            context = thread.plant.GetMyContextFromRoot(root)
+            if not thread.bolt.is_locked(context) and thread.takes_bit(context):
+                touches = False
+                break
+        context = self.GetMyMutableContextFromRoot(root)
+        if context.get_discrete_state(self._touching).value()[0] != touches:
+            context.SetDiscreteState(self._touching, [float(touches)])
+            self._bit_end.set(root, touches=touches)
 
     def _engage(self, root: Context, now: Mapping[str, Engagement]) -> None:
         """Tie the bit to a bolt if it is inside its socket."""
@@ -168,7 +191,7 @@ class Threads(LeafSystem):
         return self._rows(root)
 
     def restore(self, root: Context, rows: np.ndarray) -> None:
-        """Undo `save`; the positions are restored with the plant's."""
+        """Undo `save`; the positions are restored with the plant's, `meet_heads` is to follow."""
         for bolt, row in zip(self._threads, rows, strict=True):
             self.set(root, bolt, Engagement.of(row))
 
@@ -189,14 +212,16 @@ def add_threads(
         parts: In the plant.
         driver: Whose bit drives them; None if there is none: then no thread ever catches.
     """
-    threads = {}
+    threads, bit_end = {}, None
     if driver is not None:
+        bit_end = BitEnd.add(plant, scene_graph, driver.bit_frame)
         plant.AddModelInstance("threads")
         for name, screw in product.screws.items():
             bolt, into = parts[name].body, parts[screw.into].body
             set_head_friction(plant, scene_graph, screw, bolt, parts[screw.clamps].body)
             X_IH = product.parts[screw.into].X_AP.inverse() @ product.parts[name].X_AP
+            head_height = float(product.parts[name].mesh.bounds[1][2])
             threads[name] = add_thread(
-                plant, scene_graph, screw, bolt, into, X_IH, driver.bit_frame
+                plant, scene_graph, screw, bolt, into, X_IH, driver.bit_frame, head_height
             )
-    return Threads(threads, driver)
+    return Threads(threads, driver, bit_end)

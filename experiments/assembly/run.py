@@ -214,6 +214,6 @@ class Run:
             outcome = yield phase
             end = take_snapshot(self.simulation)
             self.timeline.add(record.step.name, phase, in_hand, (start.time, end.time))
-            record.phases[phase.subject, phase.kind] = PhaseRecord(
-                start, end, outcome.peak_force, phase.awake
-            )
+            key = phase.subject, phase.kind
+            times = record.phases[key].times + 1 if key in record.phases else 1
+            record.phases[key] = PhaseRecord(start, end, outcome.peak_force, phase.awake, times)

@@ -38,6 +38,9 @@ HEADER = """\
   def spindle_torque():
     return 0.0
   end
+  def spindle_push():
+    return 0.0
+  end
   def fixture(order):
     textmsg("fixture: ", order)
   end

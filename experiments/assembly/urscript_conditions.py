@@ -17,6 +17,7 @@ from cell.machines.arm import Arm
 from cell.simulation.conditions import (
     All,
     Below,
+    BitPushedIn,
     Either,
     FirstOf,
     Height,
@@ -141,6 +142,11 @@ def _(condition: Steady, dialect: Dialect) -> str:
 @_ends.register
 def _(condition: PushesBack, dialect: Dialect) -> str:
     return f"felt(2) >= {condition.force:.3f}"
+
+
+@_ends.register
+def _(condition: BitPushedIn, dialect: Dialect) -> str:
+    return f"spindle_push() >= {condition.force:.3f}"
 
 
 @_ends.register

@@ -119,12 +119,14 @@ class PhaseRecord:
         start, end: The truth before its first and after its last time step.
         peak_force: By arm name, largest force at its wrist, less the reading at the start [N].
         awake: Names of the parts that were: nothing acts on a part that sleeps.
+        times: How often a phase of this subject and kind has come so far in its step.
     """
 
     start: Snapshot
     end: Snapshot
     peak_force: Mapping[str, float]
     awake: frozenset[str] = frozenset()
+    times: int = 1
 
 
 @dataclass
@@ -138,7 +140,7 @@ class StepRecord:
         placed: The truth when it had been placed, or when the run began with it on the fixture.
         origin: X_WP from which the part that is moved was once taken to the fixture, if it was.
         placement: Where on the fixture the part that is moved was meant to go, if it was.
-        phases: By subject and kind; each occurs once in a step.
+        phases: By subject and kind; of one that comes several times in a step, the latest.
     """
 
     step: Step

@@ -12,6 +12,7 @@ from planning.operations.measures import base_moved, named_of
 from planning.operations.operation import Arrays, Measured, PhaseRecord, StepRecord
 from planning.operations.snapshot import Snapshot
 from planning.operations.tighten_bolts.phases import DRIVEN, DrivePhase
+from planning.operations.tighten_bolts.search import SearchPhase
 
 # A bolt is snug when its thread carries this share of the clamp force that T = K d F gives.
 SNUG = 0.1
@@ -21,6 +22,9 @@ def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:
     """Return torque, angle, advance and clamp force of each bolt, and who held against it."""
     measured: Measured = {}
     for bolt in record.step.parts:
+        if record.of(bolt, DrivePhase.BIT_IN):
+            tries = sum(phase.times for phase in record.of(bolt, SearchPhase.DOWN))
+            measured |= named_of(bolt, {"socket_searches": float(tries)})
         for tighten in record.of(bolt, DrivePhase.TIGHTEN):
             screw = cell.product.screws[bolt]
             of_bolt = trip(screw, tighten.end, record.last_awake(bolt) or tighten.end)

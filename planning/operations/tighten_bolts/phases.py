@@ -1,9 +1,9 @@
 """The phases that drive standing bolts home in star order.
 
-The driver comes down on one head after another: bit into socket, thread caught, run down, seated,
-tightened until the clutch trips. The gripper holds against it meanwhile, by the clamped part or by
-the one that the thread is in, or is out of the way. Screws that ask for two passes are all
-tightened to half their torque first.
+The driver comes down on one head after another: bit into socket, searched for where it is not;
+thread caught, run down, seated, tightened until the clutch trips. The gripper holds against it
+meanwhile, by the clamped part or by the one that the thread is in, or is out of the way. Screws
+that ask for two passes are all tightened to half their torque first.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
 
 from cell.machines.arm import Unreachable
-from cell.simulation.conditions import All, Below, Height, Signal
+from cell.simulation.conditions import All, Below, Either, Height, Signal
 from cell.simulation.phase import (
     Command,
     Follow,
@@ -33,11 +33,16 @@ from planning.operations.grasping import Reach, backed_off, let_go, opened, rais
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.tighten_bolts.search import (
+    FIND_SPEED,
+    find_socket,
+    has_turned,
+    stands_on_something,
+)
 from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed, seat_speed
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
-FIND_SPEED = 3.0  # The bit turns this slowly until its hex drops into the socket [rad/s] [A].
 SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
 FEED_RESERVE = 0.003  # The feed can follow the bolt this far beyond its engaged length [m] [A].
 STOP_TIME = 0.05  # Of the spindle [s] [A].
@@ -240,19 +245,22 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
     yield from look(station, kinds.look_at_head, bolt, [bolt], awake=_awake(station))
     R_WE = station.tool_pose(driver, "tool_tip").rotation()
     X_WE = RigidTransform(R_WE, _socket_pose(station, bolt).translation())
+    plunge = station.line(driver, tip, X_WE, speed=PLUNGE_SPEED)
+    # That the hex has dropped into the socket is told by the model of the joint between them, like
+    # a sensor in the bit: in the socket they do not touch, so nothing is felt. Beside it the bit
+    # stands on the head, or on nothing.
+    in_bit = Signal(f"{bolt} in bit")
+    missed = stands_on_something(station), has_turned(station, bolt, plunge.duration)
     outcome = yield Phase(
         kinds.bit_in,
-        # That the hex has dropped into the socket is told by the model of the joint between them,
-        # like a sensor in the bit: bit and socket do not touch otherwise, so nothing is felt.
-        All((motion_finished, Signal(f"{bolt} in bit"))),
+        Either((All((motion_finished, in_bit)), *missed)),
         timeout=5.0,
         subject=bolt,
-        commands={
-            driver.name: station.line(driver, tip, X_WE, speed=PLUNGE_SPEED),
-            spindle: Spin(FIND_SPEED),
-        },
+        commands={driver.name: plunge, spindle: Spin(FIND_SPEED)},
         awake=awake,
     )
+    if not in_bit(outcome.sensed):
+        outcome = yield from find_socket(station, bolt, outcome, awake)
 
     # The bolt stood on the mouth of its thread, or was seated, when the bit dropped in: how far it
     # has to sink is known from then on, wherever it was seen to stand.
