@@ -26,7 +26,7 @@ from experiments.assembly.run import Run
 from experiments.assembly.urscript_conditions import Dialect, ends
 from planning.operations.operation import Operation, Step
 from planning.operations.station import Station
-from planning.operations.tighten_bolts.phases import ways_above
+from planning.operations.tighten_bolts.over_bolt import ways_above
 from planning.operations.tighten_bolts.search import (
     PITCH,
     SearchPhase,

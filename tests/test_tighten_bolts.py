@@ -21,14 +21,13 @@ from planning.operations import counter_hold
 from planning.operations.counter_hold import Coming, parking
 from planning.operations.operation import Step
 from planning.operations.station import Station
+from planning.operations.tighten_bolts.over_bolt import come_beside, is_reached
 from planning.operations.tighten_bolts.phases import (
     DRIVEN,
     FIRST,
     ONLY,
     SECOND,
-    come_beside,
     foresee,
-    is_reached,
     star_order,
 )
 from planning.operations.tighten_bolts.servos import CLUTCH_TIME, Clutch, seat_speed

@@ -8,14 +8,13 @@ that ask for two passes are all tightened to half their torque first.
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator, Mapping, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
 import numpy as np
-from pydrake.math import RigidTransform, RotationMatrix
+from pydrake.math import RigidTransform
 
-from cell.machines.arm import Unreachable
 from cell.simulation.conditions import All, Below, Either, Height, Signal
 from cell.simulation.phase import (
     Command,
@@ -27,12 +26,19 @@ from cell.simulation.phase import (
     motion_finished,
 )
 from cell.simulation.vocabulary import in_programs
-from planning.motion.paths import NoPath
 from planning.operations.counter_hold import Coming, from_the_side, hold, park, parking
 from planning.operations.grasping import Reach, backed_off, let_go, opened, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.tighten_bolts.over_bolt import (
+    BIT_HOVER,
+    above,
+    come_beside,
+    is_reached,
+    may_come_near,
+    socket_pose,
+)
 from planning.operations.tighten_bolts.search import (
     FIND_SPEED,
     find_socket,
@@ -41,13 +47,11 @@ from planning.operations.tighten_bolts.search import (
 )
 from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed, seat_speed
 
-BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
 SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
 FEED_RESERVE = 0.003  # The feed can follow the bolt this far beyond its engaged length [m] [A].
 STOP_TIME = 0.05  # Of the spindle [s] [A].
 REST_TIME = 0.2  # [s] [A]
-MOST_MET = 2  # [A] Collisions that are told of.
 RETREAT = 0.05  # Of the gripper from what it held [m] [A].
 
 
@@ -176,7 +180,7 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
     away = {station.holder.name: q_park}
     for bolt in step.parts:
         if not is_reached(station, bolt, away):
-            _above(station, bolt, away)  # Raises what is said of it.
+            above(station, bolt, away)  # Raises what is said of it.
     if not holds:
         return ()
     alone = "leaves room for the driver: the jig alone bears the torque"
@@ -229,22 +233,22 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
     clamped = any(seat == {other.into, other.clamps} for other in driven)
 
     yield from look(station, kinds.look, bolt, awake=_awake(station))
-    holding = _holding(station)
-    above = _above(station, bolt)
+    holding = may_come_near(station)
+    q_above = above(station, bolt)
     yield Phase(
         kinds.above,
         motion_finished,
         timeout=20.0,
         subject=bolt,
         commands={
-            driver.name: station.move(driver, above, holding, clearance=FINE_CLEARANCE),
+            driver.name: station.move(driver, q_above, holding, clearance=FINE_CLEARANCE),
             spindle: Spin(0.0),
         },
         awake=_awake(station),
     )
     yield from look(station, kinds.look_at_head, bolt, [bolt], awake=_awake(station))
     R_WE = station.tool_pose(driver, "tool_tip").rotation()
-    X_WE = RigidTransform(R_WE, _socket_pose(station, bolt).translation())
+    X_WE = RigidTransform(R_WE, socket_pose(station, bolt).translation())
     plunge = station.line(driver, tip, X_WE, speed=PLUNGE_SPEED)
     # That the hex has dropped into the socket is told by the model of the joint between them, like
     # a sensor in the bit: in the socket they do not touch, so nothing is felt. Beside it the bit
@@ -318,91 +322,3 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
 def _awake(station: Station, *bolts: str) -> frozenset[str]:
     """Return what bears a tightening: the assembly, the bolts driven so far, and others."""
     return frozenset([*station.fixed, *station.driven, *bolts])
-
-
-def _socket_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return the pose of the bit's end when it sits in the drive of a bolt, pointing down."""
-    seat = station.cell.product.screws[bolt].bit_seat
-    p_WE = station.pose_of(bolt) @ np.array([0.0, 0.0, seat])
-    return RigidTransform(RotationMatrix.MakeXRotation(np.pi), p_WE)
-
-
-def _holding(station: Station) -> list[tuple[str, str]]:
-    """Return the pairs that may come close while the hand holds the assembly."""
-    return [(station.hand, part) for part in station.fixed]
-
-
-def _above(
-    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
-) -> np.ndarray:
-    """Return the nearest configuration (n,) over a bolt's head; the arguments: `ways_above`.
-
-    Raises:
-        Unreachable: There is none.
-    """
-    driver = station.driver
-    near = driver.positions(station.context)
-    found = list(ways_above(station, bolt, elsewhere))
-    if not found:
-        X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
-        reason = "out of reach, however the driver is turned"
-        solutions = driver.configurations(station.context, driver.frame("tool_tip"), X_WE, near)
-        if solutions:
-            met = station.model.collisions(driver.name, solutions[0])
-            reason = f"no turn of the driver keeps clear: {'; '.join(met[:MOST_MET])}"
-        raise Unreachable(driver.name, "tool_tip", X_WE, reason)
-    return min(found, key=lambda q: float(np.max(np.abs(q - near))))
-
-
-def is_reached(
-    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
-) -> bool:
-    """Return whether there is a way over a bolt's head; the arguments: `ways_above`."""
-    return any(True for _ in ways_above(station, bolt, elsewhere))
-
-
-def ways_above(
-    station: Station, bolt: str, elsewhere: Mapping[str, np.ndarray] | None = None
-) -> Iterator[np.ndarray]:
-    """Yield configurations (n,) over a bolt's head, turned any way about its axis.
-
-    Args:
-        station: The planner's view of the cell.
-        bolt: Name of the bolt.
-        elsewhere: See `Station.surroundings`.
-    """
-    driver, holding = station.driver, _holding(station)
-    tip, near = driver.frame("tool_tip"), driver.positions(station.context)
-    X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
-    for turn in np.deg2rad(np.arange(0.0, 360.0, 30.0)):
-        X = X_WE @ RigidTransform(RotationMatrix.MakeZRotation(turn), np.zeros(3))
-        yield from station.configurations(driver, tip, X, near, holding, FINE_CLEARANCE, elsewhere)
-
-
-def come_beside(station: Station, bolt: str, coming: Coming) -> dict[str, Command]:
-    """Return the command that brings the driver over a bolt while the hand comes, too.
-
-    Where they would be in each other's way, there is none: the driver comes when the hand is there.
-
-    Args:
-        station: The planner's view of the cell.
-        bolt: Name of the bolt.
-        coming: What the hand is about to do.
-    """
-    driver, hand, jaws = station.driver, station.holder.name, {station.hand: coming.jaws}
-    try:
-        above = _above(station, bolt, {hand: coming.q_then, **jaws})
-        motion = station.move(
-            driver,
-            above,
-            _holding(station),
-            FINE_CLEARANCE,
-            elsewhere=jaws,
-            beside={hand: coming.motion},
-        )
-    except (Unreachable, NoPath):
-        return {}
-    # The last stretch of the hand, with the driver over the bolt; it is as straight as this.
-    stretch = np.linspace(coming.motion.q[-1], coming.q_then, 20)
-    clear = all(station.model.are_free({driver.name: above, hand: q}) for q in stretch)
-    return {driver.name: motion} if clear else {}
