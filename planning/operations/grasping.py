@@ -276,6 +276,7 @@ def let_go(
         commands={gripper.name: opened(gripper.model, grasp)},
         awake=awake,
         riding=riding,
+        fine_log=True,  # What springs back does so within milliseconds.
     )
     station.put_down()
     X_WJaw = station.tool_pose(arm, grasp.jaw)

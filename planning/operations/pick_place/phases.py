@@ -183,6 +183,7 @@ def put(station: Station, part: str, reach: Reach, placement: Placement) -> Iter
         guard=holding,
         start=(fix_part,),
         awake=awake,
+        fine_log=True,  # A kick lasts milliseconds.
     )
     yield from let_go(station, part, reach.grasp, RETREAT, awake)
     yield Phase(PlacePhase.SETTLE, after(SETTLE_TIME), timeout=2.0, subject=part, awake=awake)
