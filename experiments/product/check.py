@@ -17,6 +17,7 @@ from planning.product_check.check import (
     fixture_findings,
     machine_findings,
     plan_findings,
+    press_findings,
     simulated_findings,
 )
 from planning.product_check.finding import Finding, Level
@@ -57,7 +58,7 @@ def find(
     fixing = plan(product, order, config=config)
     planned, todo = plan_findings(product, fixing)
     choices = fixture_choices(product, fixing, config)
-    found += [*fixture_findings(fixing, choices), *planned]
+    found += [*fixture_findings(fixing, choices), *press_findings(fixing, choices), *planned]
     running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
     borne = borne_torques(fixing, choices)
     return [*found, *simulated_findings(running.simulation, running.station, todo, borne)]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,6 +11,7 @@ from cell.cad.round_features import cylinders_of
 from cell.configuration.config import CellConfig
 from cell.errors import InputError, RunFailure
 from cell.machines.grippers import GRIPPER_MODELS
+from cell.products.joints import Joint, Press
 from cell.products.materials import (
     DEFAULT_MATERIAL,
     DENSITIES,
@@ -22,6 +23,7 @@ from cell.products.product import Product
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.feasibility.directions import unit_vector
+from planning.operations.press.strength import grip_for, needed
 from planning.product_draft.contact_models import contact_models
 from planning.product_draft.grasps import part_grasps, screw_grasp
 from planning.product_draft.guess import Guess
@@ -98,6 +100,9 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
     modelled = write_parts(grouped, seen, contacts, folder)
     nests = write_tray(grouped, seen, folder)
     waiting = {name: replace(part, X_TrayP=nests[name][0]) for name, part in modelled.items()}
+    joining = Joining(seen, fixing, product.up, contacts, options.strength, options.torque)
+    joints = tuple(joining.joints())
+    pushed = _grip_forces(joints, place, options.config)
     gripped = {}
     hand = _hand(options.config)
     for name, part in waiting.items():
@@ -113,11 +118,10 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
             nest=nests[name][1],
             screws=[screw for screw in screws if screw.clamps == name],
             apart=options.config.motion.arm_clearance,
+            wanted=pushed.get(name, 0.0),
         )
         guesses += more
         gripped[name] = replace(part, grasps=tuple(grasps))
-    joining = Joining(seen, fixing, product.up, contacts, options.strength, options.torque)
-    joints = tuple(joining.joints())
     drafted = replace(
         grouped,
         parts=gripped,
@@ -193,6 +197,16 @@ def _planned(
         f"Every order of '{product.name}' fixes more than one part, the best {names}: contact "
         "models are made for one. --order A,B,C asks for another order."
     )
+
+
+def _grip_forces(
+    joints: Sequence[Joint], place: Mapping[str, int], config: CellConfig
+) -> dict[str, float]:
+    """Return the grip force per pad that parts want which are pressed in, by their names [N]."""
+    presses = [joint for joint in joints if isinstance(joint, Press)]
+    brought = [max(joint.parts, key=lambda name: place[name]) for joint in presses]
+    forces = [grip_for(needed(config.insertion, joint)) for joint in presses]
+    return dict(zip(brought, forces, strict=True))
 
 
 def _hand(config: CellConfig) -> HandShape:

@@ -41,6 +41,7 @@ def part_grasps(
     nest: Nest,
     screws: Sequence[ScrewGuess] = (),
     apart: float = 0.0,
+    wanted: float = 0.0,
 ) -> tuple[list[Grasp], list[Guess]]:
     """Return the grasps of a part, from above and, if it is held while screwed, from the side.
 
@@ -53,12 +54,13 @@ def part_grasps(
         nest: Its place in the tray.
         screws: That clamp it: it is held from the side, beside the driver, while they are driven.
         apart: Distance kept between the arms [m].
+        wanted: Grip force per pad from above, as far as pads and gripper bear it [N].
     """
     assert part.X_TrayP is not None
     there = {"the bed": surface(_bed(base, up))}
     there |= {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
     around = {"its nest": surface(_nest_in_part(nest, part.X_TrayP)), **there}
-    above = sample_grasps(part.mesh, part.mass, hand, up, [*around.values()])
+    above = sample_grasps(part.mesh, part.mass, hand, up, [*around.values()], wanted=wanted)
     why = "" if above else why_no_grasp(part.mesh, part.mass, hand, up, around)
     guesses = [_guess(part.name, above, "from above", why)]
     side: list[RankedGrasp] = []
