@@ -42,6 +42,9 @@ from cell.products.joints import Press
 INSTANCE = "press_fits"  # The model instance of all followers.
 FOLLOWER_MASS = 1e-3  # [A] As light as that of a thread [kg].
 FOLLOWER_INERTIA = 1e-6
+# Of the follower while it slides. The friction of a step is explicit: it would throw a bush of some
+# grams back from its seat, to where it was before, again and again [M].
+SLIDING_MASS = 0.5
 # The wall leaves 50 um of play (`PRESS_PLAY` of drafted contact models): a tip in the mouth is
 # within that of the axis, but for its facets, and tilts by 1 degree at most once it is 6 mm deep.
 LATERAL_GATE, TILT_GATE = 1e-4, float(np.deg2rad(1.0))
@@ -133,12 +136,10 @@ class PressFit:
         return float(forces[int(self.slide.index())].translational()[2])
 
     def place_follower(self, context: Context) -> None:
-        """Put the follower where the shaft is, as fast as it is along the axis."""
+        """Put the follower where the shaft is."""
         X_HT = self.X_HT(context)
-        V_HT = self.tip_frame.CalcSpatialVelocity(context, self.hole_frame, self.hole_frame)
         self.turn.set_angle(context, float(RollPitchYaw(X_HT.rotation()).yaw_angle()))
         self.slide.set_translation(context, float(X_HT.translation()[2]))
-        self.slide.set_translation_rate(context, float(V_HT.translational()[2]))
 
     def apply(self, context: Context, state: FitState) -> None:
         """Close or open tie and joints as a state asks for (plant context)."""
@@ -146,6 +147,9 @@ class PressFit:
             self.plant.SetConstraintActiveStatus(context, constraint, state is not FitState.FREE)
         self.turn.Lock(context)
         slides = state in (FitState.IN, FitState.OUT)
+        mass = SLIDING_MASS if slides else FOLLOWER_MASS
+        slider = self.slide.child_body()
+        slider.SetSpatialInertiaInBodyFrame(context, _small_inertia(mass))
         (self.slide.Unlock if slides else self.slide.Lock)(context)
 
 
@@ -174,10 +178,9 @@ def add_press_fit(
         plant.AddFrame(FixedOffsetFrame(f"{name}_{end}", body.body_frame(), X_AP.inverse() @ X_AH))
         for end, (body, X_AP) in (("hole", hole), ("tip", shaft))
     )
-    unit = FOLLOWER_INERTIA / FOLLOWER_MASS
-    inertia = SpatialInertia(FOLLOWER_MASS, np.zeros(3), UnitInertia(unit, unit, unit))
     slider, follower = (
-        plant.AddRigidBody(f"{name}_{part}", instance, inertia) for part in ("slider", "follower")
+        plant.AddRigidBody(f"{name}_{part}", instance, _small_inertia(FOLLOWER_MASS))
+        for part in ("slider", "follower")
     )
     z = np.array([0.0, 0.0, 1.0])
     slide = plant.AddJoint(PrismaticJoint(f"{name}_slide", H, slider.body_frame(), z))
@@ -190,6 +193,12 @@ def add_press_fit(
         for p_TQ in _tie_points(shaft[0], T)
     )
     return PressFit(press, plant, H, T, slide, turn, tie)
+
+
+def _small_inertia(mass: float) -> SpatialInertia:
+    """Return the inertia of a follower, or of the half of it that slides, with a mass [kg]."""
+    unit = FOLLOWER_INERTIA / mass
+    return SpatialInertia(mass, np.zeros(3), UnitInertia(unit, unit, unit))
 
 
 def _tie_points(shaft: RigidBody, T: FixedOffsetFrame) -> list[np.ndarray]:

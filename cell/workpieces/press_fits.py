@@ -1,8 +1,8 @@
 """When press fits catch, slip and stick: rules applied after every step.
 
-A shaft whose tip has come into the mouth of its hole is caught, and slides in as fast as it came. A
-sliding one sticks as soon as it does not move on. A stuck one slips once it is pushed, or pulled,
-with more than its friction, and comes free where it is pulled out of the mouth.
+A shaft whose tip has come into the mouth of its hole is caught, and stuck there. What is stuck
+slips once it is pushed, or pulled, with more than its friction; what slides sticks as soon as it
+does not move on, and comes free where it is pulled out of the mouth.
 """
 
 from __future__ import annotations
@@ -86,7 +86,7 @@ class PressFits(LeafSystem):
     def _next_state(self, fit: PressFit, state: FitState, context: Context) -> FitState:
         """Return the state of a fit after a step, given the plant's Context."""
         if state is FitState.FREE:
-            return FitState.IN if fit.meets(context) else state
+            return FitState.STUCK if fit.meets(context) else state
         if state is FitState.STUCK:
             push, most = fit.push(context), fit.friction_at(fit.depth(context))
             if abs(push) <= most:
@@ -129,7 +129,7 @@ def add_press_fits(plant: MultibodyPlant, product: Product, parts: Parts) -> Pre
     """
     fits = []
     if product.presses:
-        plant.AddModelInstance(INSTANCE)
+        plant.set_gravity_enabled(plant.AddModelInstance(INSTANCE), False)
     for number, press in enumerate(product.presses):
         shaft, hole = product.parts[press.shaft], product.parts[press.hole]
         out = product.up_axis if product.enters_from_above(press) else -product.up_axis
