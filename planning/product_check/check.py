@@ -73,7 +73,7 @@ def press_findings(fixing: FixingPlan, choices: Sequence[Choice]) -> Iterator[Fi
         figures = choice.candidates[choice.paper].figures
         if "bears_down_N" in figures:
             down, bears = figures["pressed_down_N"], figures["bears_down_N"]
-            text = f"pressed down with {down:.3g} N, of {bears:.3g} N that the fixture bears"
+            text = f"pressed down with {down:.0f} N, of {bears:.0f} N that the fixture bears"
             yield (good if down <= bears else fails)(step.fixed_part, text)
 
 

@@ -50,12 +50,12 @@ def check_strength(station: Station, press: Press, part: str) -> None:
     if takes <= min(by_arm, by_grip):
         return
     limits = (
-        f"the {arm.name} arm pushes with {by_arm:.3g} N at most, its payload of "
+        f"the {arm.name} arm pushes with {by_arm:.0f} N at most, its payload of "
         f"{arm.model.payload:g} kg"
         if by_arm < by_grip
-        else f"the pads, with {grip_for(by_grip):.3g} N on each, slip beyond {by_grip:.3g} N"
+        else f"the pads, with {grip_for(by_grip):.0f} N on each, slip beyond {by_grip:.0f} N"
     )
     raise NoOperation(
-        f"'{part}' is pressed together with '{other}' by {press.force:.3g} N, {takes:.3g} N until "
+        f"'{part}' is pressed together with '{other}' by {press.force:.0f} N, {takes:.0f} N until "
         f"its seat is felt; {limits}."
     )
