@@ -11,6 +11,7 @@ from cell.cad.round_features import cylinders_of
 from cell.configuration.config import CellConfig
 from cell.errors import InputError, RunFailure
 from cell.machines.grippers import GRIPPER_MODELS
+from cell.machines.grippers.pads import grip_for
 from cell.products.joints import Joint, Press
 from cell.products.materials import (
     DEFAULT_MATERIAL,
@@ -23,7 +24,6 @@ from cell.products.product import Product
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.feasibility.directions import unit_vector
-from planning.operations.press.strength import grip_for, needed
 from planning.product_draft.contact_models import contact_models
 from planning.product_draft.grasps import part_grasps, screw_grasp
 from planning.product_draft.guess import Guess
@@ -205,7 +205,8 @@ def _grip_forces(
     """Return the grip force per pad that parts want which are pressed in, by their names [N]."""
     presses = [joint for joint in joints if isinstance(joint, Press)]
     brought = [max(joint.parts, key=lambda name: place[name]) for joint in presses]
-    forces = [grip_for(needed(config.insertion, joint)) for joint in presses]
+    # Until the seat is felt: see `planning.operations.press`.
+    forces = [grip_for(joint.force + config.insertion.force_limit) for joint in presses]
     return dict(zip(brought, forces, strict=True))
 
 

@@ -13,6 +13,7 @@ from collections.abc import Callable, Generator, Iterator
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.machines.grippers.pads import borne_along
 from cell.products.joints import Press
 from cell.products.product import Grasp, Product
 from cell.simulation.conditions import All, Below, Either, PushesBack, Steady
@@ -21,7 +22,6 @@ from planning.operations.mating import foresee_mating, mate, mating_at_hole
 from planning.operations.operation import Step
 from planning.operations.press.strength import (
     borne_by_arm,
-    borne_by_grip,
     check_strength,
     needed,
 )
@@ -92,7 +92,7 @@ def press_in(hand: SoftHand, press: Press) -> Generator[Phase, Outcome, None]:
     if hand.gap(outcome) > depth - entered:
         outcome = yield hand.search(hand.gap(outcome), entered)
     station, felt = hand.station, needed(config, press)
-    most = min(borne_by_arm(station), borne_by_grip(hand.grasp))
+    most = min(borne_by_arm(station), borne_along(hand.grasp.force))
     # Straight down from where the part has found its hole, as far as draws with all the force,
     # and further by what the part may slip in the grip.
     x, y, _ = hand.here(outcome).translation()
@@ -120,4 +120,4 @@ def _down(
 def _suits(station: Station, press: Press) -> Callable[[Grasp], bool]:
     """Return whether the pads do not slip, by grasp."""
     takes = needed(station.config.insertion, press)
-    return lambda grasp: borne_by_grip(grasp) >= takes
+    return lambda grasp: borne_along(grasp.force) >= takes

@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from cell.configuration.config import InsertionConfig
+from cell.machines.grippers.pads import borne_along
 from cell.products.joints import Press
-from cell.products.product import Grasp
 from planning.operations.operation import NoOperation
 from planning.operations.station import Station
 
 GRAVITY = 9.81  # [m/s2]
-# [D] 2 a b / (a + b) of the pads' 0.8 and of 0.2, the least of any part's contact pieces.
-PAD_FRICTION = 0.32
-# [M] Of that, before pads creep by a millimetre: 26.6 N where 32 would be friction. What they are
-# squeezed by takes force from the grip.
-HOLDS = 0.8
 
 
 def needed(config: InsertionConfig, press: Press) -> float:
@@ -21,19 +16,9 @@ def needed(config: InsertionConfig, press: Press) -> float:
     return press.force + config.force_limit
 
 
-def grip_for(force: float) -> float:
-    """Return the grip force per pad under which the pads bear a force along them [N]."""
-    return force / (2.0 * HOLDS * PAD_FRICTION)
-
-
 def borne_by_arm(station: Station) -> float:
     """Return the force with which the arm may push: that of its payload [N]."""
     return GRAVITY * station.holder.model.payload
-
-
-def borne_by_grip(grasp: Grasp) -> float:
-    """Return the force along the pads that they bear without slipping on the part [N]."""
-    return 2.0 * HOLDS * PAD_FRICTION * grasp.force
 
 
 def check_strength(station: Station, press: Press, part: str) -> None:
@@ -45,15 +30,15 @@ def check_strength(station: Station, press: Press, part: str) -> None:
     other = next(name for name in press.parts if name != part)
     takes = needed(station.config.insertion, press)
     arm, by_arm = station.holder, borne_by_arm(station)
-    grasps = station.part(part).grasps
-    by_grip = max(map(borne_by_grip, grasps), default=0.0)
+    grip = max((grasp.force for grasp in station.part(part).grasps), default=0.0)
+    by_grip = borne_along(grip)
     if takes <= min(by_arm, by_grip):
         return
     limits = (
         f"the {arm.name} arm pushes with {by_arm:.0f} N at most, its payload of "
         f"{arm.model.payload:g} kg"
         if by_arm < by_grip
-        else f"the pads, with {grip_for(by_grip):.0f} N on each, slip beyond {by_grip:.0f} N"
+        else f"the pads, with {grip:.0f} N on each, slip beyond {by_grip:.0f} N"
     )
     raise NoOperation(
         f"'{part}' is pressed together with '{other}' by {press.force:.0f} N, {takes:.0f} N until "
