@@ -115,6 +115,11 @@ class SoftHand:
         return RigidTransform(X_AP.inverse() @ self.mating.p_AoC)
 
     @property
+    def X_JawC(self) -> RigidTransform:
+        """C in the jaw."""
+        return self.X_JawP @ self.X_PC
+
+    @property
     def X_WSeat(self) -> RigidTransform:
         """Where C is when the part is seated."""
         return self.X_WGoal @ self.X_PC
@@ -122,7 +127,7 @@ class SoftHand:
     @property
     def height(self) -> Height:
         """How high C is."""
-        return Height(self.jaw, self.X_JawP @ self.X_PC)
+        return Height(self.jaw, self.X_JawC)
 
     def gap(self, outcome: Outcome) -> float:
         """Return how high C was over its seat at the end of a phase [m]."""
@@ -130,7 +135,7 @@ class SoftHand:
 
     def here(self, outcome: Outcome) -> RigidTransform:
         """Return X_WC at the end of a phase, upright: a spring that still pulls would wedge it."""
-        X_WC = outcome.sensed.X_WF(self.jaw) @ self.X_JawP @ self.X_PC
+        X_WC = outcome.sensed.X_WF(self.jaw) @ self.X_JawC
         return RigidTransform(self.X_WSeat.rotation(), X_WC.translation())
 
     def phase(
@@ -149,14 +154,13 @@ class SoftHand:
         arm, mating = self.station.holder.name, self.mating
         # It slides on whatever it touches there, not only on what it comes to.
         others = {mating.on, *self.station.fixed} - {mating.part}
-        X_JawC = self.X_JawP @ self.X_PC
         guards = lost_grasp(self.station), TooMuchForce(arm, most, "insertion force")
         return Phase(
             kind,
             until,
             timeout=timeout,
             subject=mating.part,
-            commands={arm: impedance(self.config, self.jaw, X_JawC, target, force)},
+            commands={arm: impedance(self.config, self.jaw, self.X_JawC, target, force)},
             guard=FirstOf(guards),
             awake=self.awake,
             mating=frozenset(frozenset([mating.part, other]) for other in others),
