@@ -57,6 +57,16 @@ def pressed_block(interference: float = 0.007) -> dict[str, Manifold]:
     return {"block": block, "bush": bush - cylinder(6.5, -9.0, 7.0, FACETS)}
 
 
+def capped_post(interference: float = 0.006) -> dict[str, Manifold]:
+    """Return a block with a post on it, and a cap with interference over that.
+
+    Of POM 6 um radially take some 18 N over the 8 mm of the post.
+    """
+    post = cylinder(8.0, -1.0, 0.0, FACETS) + boss(8.0, 0.0, 8.0, 0.5, FACETS)
+    cap = cylinder(10.0, 0.0, 14.0, FACETS) - cylinder(8.0 - interference, -1.0, 10.0, FACETS)
+    return {"block": box((-20, -20, -40), (20, 20, 0)) + post, "cap": cap}
+
+
 def bearing_block() -> dict[str, Manifold]:
     """Return a block with a blind hole, a flanged bush in it, and a cover on four M4 x 16.
 

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import pressed_block, write_meshes
+from drawn_products import capped_post, pressed_block, write_meshes
+from manifold3d import Manifold
 from pydrake.math import RigidTransform
 
 from cell import CellConfig, Simulation, build_cell
@@ -25,9 +27,9 @@ from planning.product_check.check import fixture_choices, press_findings
 from planning.product_check.finding import Level
 
 
-def drafted(folder: Path, interference: float, *materials: str) -> Path:
-    """Return the product file of a block and its bush."""
-    source, out = write_meshes(pressed_block(interference), folder / "cad"), folder / "own"
+def drafted(folder: Path, drawn: Mapping[str, Manifold], *materials: str) -> Path:
+    """Return the product file that is drafted from what is drawn."""
+    source, out = write_meshes(drawn, folder / "cad"), folder / "own"
     given = [word for material in materials for word in ("--material", material)]
     assert main(["init", str(source), "--units", "mm", *given, "--out", str(out), "--quiet"]) == 0
     return out / "product.yaml"
@@ -35,7 +37,7 @@ def drafted(folder: Path, interference: float, *materials: str) -> Path:
 
 @pytest.fixture(scope="module")
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return drafted(tmp_path_factory.mktemp("pressed"), 0.007, "pom")
+    return drafted(tmp_path_factory.mktemp("pressed"), pressed_block(), "pom")
 
 
 @pytest.fixture(scope="module")
@@ -64,7 +66,7 @@ def test_steel_in_aluminium_is_refused_with_its_force(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     """10 um radially are kilonewtons."""
-    file = drafted(tmp_path, 0.01, "bush=steel", "block=aluminium")
+    file = drafted(tmp_path, pressed_block(0.01), "bush=steel", "block=aluminium")
     capsys.readouterr()
     assert main(["check", str(file)]) == 1
     lines = capsys.readouterr().out.splitlines()
@@ -145,10 +147,23 @@ def test_press_joints_know_which_way_the_shaft_leaves(product: Product) -> None:
 @pytest.mark.slow
 @pytest.mark.parametrize("time_step", [1e-3, 5e-4])
 def test_the_bush_is_pressed_home(file: Path, tmp_path: Path, time_step: float) -> None:
-    """The force over depth is Lame's within 5 %, at half the step, too."""
+    """The force over depth is the joint's within 5 %, at half the step, too."""
     step = f"simulation.time_step={time_step:g}"
     arguments = ["assemble", str(file), "--out", str(tmp_path), "--set", step, "--quiet"]
     assert main(arguments) == 0
-    measured = json.loads((tmp_path / "result.json").read_text())["steps"][1]["measured"]
+    check_pressed_home(tmp_path)
+
+
+@pytest.mark.slow
+def test_a_cap_is_pressed_onto_its_post(tmp_path: Path) -> None:
+    """The part with the hole is in the hand."""
+    file, out = drafted(tmp_path, capped_post(), "pom"), tmp_path / "run"
+    assert main(["assemble", str(file), "--out", str(out), "--quiet"]) == 0
+    check_pressed_home(out)
+
+
+def check_pressed_home(out: Path) -> None:
+    """Check force and seat of the second step of a run."""
+    measured = json.loads((out / "result.json").read_text())["steps"][1]["measured"]
     assert abs(measured["press_force_error"]) < 0.05
     assert abs(measured["gap_m"]) < 2e-5

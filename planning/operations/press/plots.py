@@ -15,7 +15,8 @@ from planning.operations.soft_hand import MatePhase
 SEATED = (
     "force on the part over the depth of the shaft in the hole. It rises with the engaged depth, "
     "as the joint's force says; the steep end is the seat, at which the hand stops when it feels "
-    "the force of the level. Before zero the tip is above the mouth"
+    "the force of the level. Before zero the tip is above the mouth; the spike there: the fit "
+    "catches, and stands for a step"
 )
 
 
