@@ -49,8 +49,11 @@ LAYERS: dict[str, dict[str, set[str]]] = {
         "motion": set(),
         "perception": set(),
         "operations": {"feasibility", "motion", "assembly_plan", "perception"},
-        "product_draft": {"feasibility", "assembly_plan"},
-        "product_check": {"assembly_plan", "fixture_analysis", "motion", "operations"},
+        "product_draft": {"feasibility", "fixture_analysis", "assembly_plan"},
+        "product_check": {
+            "feasibility", "fixture_analysis", "assembly_plan", "motion", "operations",
+            "product_draft",
+        },
     },
     "experiments": {
         "reporting": set(),

@@ -2,26 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, cast
 
 import numpy as np
 import pytest
+from pydrake.math import RigidTransform
 from teleport import carry_out
 
 from cell.configuration.config import CellConfig
+from cell.products.joints import Fit
 from cell.products.loading import load_product
 from cell.simulation.phase import Phase
 from experiments.assembly.prepare import RunningCell
 from planning.motion.timing import JointMotion
+from planning.operations.bolts import mouth_pose, standing_pose
 from planning.operations.grasping import HandPhase
+from planning.operations.mating import mate
 from planning.operations.place_bolts.phases import (
     PLACES,
     BoltPhase,
-    mouth_pose,
     place_bolt,
-    standing_pose,
 )
 from planning.operations.placement import pose_on_jig
+from planning.operations.soft_hand import Mating
 
 PRODUCT = load_product("motor_unit")
 LOWERED = (BoltPhase.LOWER, BoltPhase.LOWER_BESIDE)
@@ -44,8 +48,13 @@ def running() -> RunningCell:
 
 def placed(running: RunningCell, blocked: int) -> list[Phase]:
     """Return the phases of a bolt whose tip meets the face so many times before its hole."""
-    done, station, outcome = [], running.station, None
-    arm, pending = station.holder, cast(Any, place_bolt(station, "bolt_1"))
+    return carried_out(running, place_bolt(running.station, "bolt_1"), blocked)
+
+
+def carried_out(running: RunningCell, phases: Iterator[Phase], blocked: int = 0) -> list[Phase]:
+    """Carry out phases and return them; that many times a tip that is lowered meets the face."""
+    done, outcome = [], None
+    arm, pending = running.station.holder, cast(Any, phases)
     while True:
         try:
             phase = pending.send(outcome)
@@ -88,6 +97,26 @@ def test_hole_is_felt_for_round_where_it_should_be(running: RunningCell) -> None
     np.testing.assert_allclose(offsets, PLACES[:4], atol=2e-5)
     assert len({tuple(np.round(1e4 * offset)) for offset in offsets}) == 4
     assert X_WMouth.translation()[2] > station.cell.X_WJ.translation()[2]
+
+
+def test_bolts_that_ride_come_to_stand_on_their_threads() -> None:
+    """Nobody looks after mating: where they rode in the hand they do not stay."""
+    running = RunningCell(PRODUCT, CellConfig(), 0)
+    station, cell = running.station, running.simulation.cell
+    X_WMotor = pose_on_jig(station, "motor", PRODUCT.up, 0.0, 0.03)
+    plate, context = cell.parts["plate"], running.simulation.context
+    cell.plant.SetFreeBodyPose(context, cell.parts["motor"].body, X_WMotor)
+    X_WA = plate.X_WP(context) @ PRODUCT.parts["plate"].X_AP.inverse()
+    bolt = PRODUCT.parts["bolt_1"]
+    cell.plant.SetFreeBodyPose(context, cell.parts["bolt_1"].body, X_WA @ bolt.X_AP)
+    station.fixed = ("motor",)
+    fit = next(joint for joint in PRODUCT.joints if isinstance(joint, Fit))
+    up = np.array([0.0, 0.0, 1.0])
+    mating = Mating("plate", "motor", fit.p_AoF, fit.depth, up)
+    carried_out(running, mate(station, mating, ("bolt_1",)))
+    X_AStanding = RigidTransform([0.0, 0.0, PRODUCT.screws["bolt_1"].thread_depth]) @ bolt.X_AP
+    X_WA = station.pose_of("motor") @ PRODUCT.parts["motor"].X_AP.inverse()
+    assert station.pose_of("bolt_1").IsNearlyEqualTo(X_WA @ X_AStanding, 1e-9)
 
 
 def test_bolt_that_finds_no_hole_is_let_go_and_judged(running: RunningCell) -> None:

@@ -20,6 +20,8 @@ from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
 from experiments.product.random_drawing import draw
 from planning.assembly_plan.planner import plan
+from planning.operations.counter_hold import from_the_side
+from planning.operations.tighten_bolts.phases import holdable
 from planning.product_check.check import (
     borne_torques,
     fixture_choices,
@@ -192,16 +194,36 @@ def test_a_part_that_is_gripped_from_the_side_only_is_named(product: Product) ->
     assert "part 'cover' has no grasp from above" in found
 
 
+def gripped_from_above_only(product: Product, *names: str) -> Product:
+    for name in names:
+        top = tuple(g for g in product.parts[name].grasps if g.name.startswith("top"))
+        assert 0 < len(top) < len(product.parts[name].grasps)
+        product = changed(product, name, grasps=top)
+    return product
+
+
 @pytest.mark.parametrize(("borne", "level"), [(0.3, Level.FAILS), (0.9, Level.DOUBTFUL)])
 def test_a_torque_that_nothing_bears_is_said(product: Product, borne: float, level: Level) -> None:
     """No grasp from the side: the jig alone holds against the driver."""
-    top = tuple(g for g in product.parts["cover"].grasps if g.name.startswith("top"))
-    bare = changed(product, "cover", grasps=top)
+    bare = gripped_from_above_only(product, "cover", "block")
     _, todo = plan_findings(bare, plan(bare, config=CONFIG))
     station = RunningCell(bare, CONFIG, 0).station
     found = said(reach_findings(station, todo, dict.fromkeys(bare.screws, borne)), level)
-    assert "tighten bolts: no grasp of 'cover' from the side leaves room" in found
+    assert "tighten bolts: no grasp of 'cover' or 'block' from the side leaves room" in found
     assert ("0.3 of 0.5 N m" in found) == (level is Level.FAILS)
+
+
+def test_the_part_with_the_threads_is_held_where_the_clamped_one_cannot_be(
+    product: Product,
+) -> None:
+    bare = gripped_from_above_only(product, "cover")
+    _, todo = plan_findings(bare, plan(bare, config=CONFIG))
+    station = RunningCell(bare, CONFIG, 0).station
+    found = list(reach_findings(station, todo, dict.fromkeys(bare.screws, 0.3)))
+    assert all(finding.level is Level.GOOD for finding in found)
+    station.fixed = ("block", "cover", *bare.screws)
+    held, _ = next(from_the_side(station, holdable(station, todo[-1])))
+    assert held == "block"
 
 
 def test_what_the_jig_bears_of_a_torque_is_known(product: Product) -> None:

@@ -83,6 +83,38 @@ def test_covariance_covers_the_errors_that_noise_makes(bracket, pose) -> None:
     assert 0.02 < np.median(squares) < 3.0
 
 
+CLOSE = np.diag(np.repeat([np.deg2rad(0.5), 5e-4], 3) ** 2)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_what_is_not_in_sight_stays_as_it_is_known(pose, seed: int) -> None:
+    """Of a plate sunk to its face into level ground nothing tells the yaw, nor the place in it."""
+    plate = trimesh.creation.box([0.07, 0.06, 0.005])
+    ground = trimesh.creation.box([0.3, 0.3, 0.005])  # Flush with the face of the plate.
+    cameras = viewpoints(pose.translation(), 3, np.random.default_rng(seed))
+    views = seen(ground, pose, cameras, noise=4e-4)
+    views = [View(v.points[np.linalg.norm(v.points - pose.translation(), axis=1) < 0.05], v.p_WC)
+             for v in views]  # fmt: skip
+    start = off(pose, 0.3, 0.3, seed)
+    found = register(Surface.of(plate), views, start, covariance=CLOSE)
+    assert found is not None
+    turn = Rotation.from_matrix((start.inverse() @ found.X_WP).rotation().matrix()).as_rotvec()
+    assert abs(turn[2]) < np.deg2rad(0.3)
+    error = (pose.inverse() @ found.X_WP).rotation().matrix()
+    assert np.arccos(error[2, 2]) < np.deg2rad(0.1)
+    assert np.sqrt(found.covariance[2, 2]) == pytest.approx(np.deg2rad(0.5), rel=0.2)
+
+
+def test_part_that_has_moved_is_seen_although_it_was_known_elsewhere(bracket, pose) -> None:
+    cameras = viewpoints(pose.translation(), 3, np.random.default_rng(2))
+    views = seen(bracket, pose, cameras, noise=4e-4)
+    found = register(Surface.of(bracket), views, off(pose, 5.0, 10.0, 1), covariance=CLOSE)
+    assert found is not None
+    error = pose.inverse() @ found.X_WP
+    assert np.linalg.norm(error.translation()) < 2e-4
+    assert error.rotation().ToAngleAxis().angle() < np.deg2rad(0.3)
+
+
 def test_too_few_points_are_no_estimate(bracket, pose) -> None:
     surface = Surface.of(bracket)
     camera = looking_at(pose.translation() + [0.0, -DISTANCE, 0.1], pose.translation())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -10,12 +11,15 @@ import pytest
 from pydrake.math import RigidTransform, RollPitchYaw
 
 from cell.configuration.config import CellConfig
+from cell.machines.arm import Unreachable
 from cell.machines.driver import DriverReading
 from cell.products.loading import load_product
 from cell.simulation.phase import Sensed
 from experiments.assembly.prepare import RunningCell
 from planning.motion.timing import JointMotion
-from planning.operations.counter_hold import Coming
+from planning.operations import counter_hold
+from planning.operations.counter_hold import Coming, parking
+from planning.operations.operation import Step
 from planning.operations.station import Station
 from planning.operations.tighten_bolts.phases import (
     DRIVEN,
@@ -23,9 +27,11 @@ from planning.operations.tighten_bolts.phases import (
     ONLY,
     SECOND,
     come_beside,
+    foresee,
+    is_reached,
     star_order,
 )
-from planning.operations.tighten_bolts.servos import CLUTCH_TIME, Clutch
+from planning.operations.tighten_bolts.servos import CLUTCH_TIME, Clutch, seat_speed
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
@@ -90,6 +96,17 @@ def test_clutch_trips_on_torque_that_lasts_and_not_on_a_shock(dt: float) -> None
     assert trip_time([0.0, *[0.5] * (steps + 1)], dt) == pytest.approx(2 * dt + CLUTCH_TIME)
 
 
+def test_stiff_joints_are_tightened_slowly() -> None:
+    """In the time of the clutch each joint takes up the same share of its torque, or less."""
+    screws = load_product("motor_unit").screws
+    m3 = screws["bolt_1"]
+    assert seat_speed(m3, 7.0) == 7.0
+    m5 = replace(m3, diameter=5e-3, pitch=0.8e-3)
+    # A force of 3/5 through 3/5 of the compliance, and a coarser thread.
+    assert seat_speed(m5, 7.0) == pytest.approx(7.0 * 1.037 * (3 / 5) ** 2 * 0.5 / 0.8, rel=1e-3)
+    assert seat_speed(replace(m5, torque=0.1 * m5.torque), 7.0) == 1.0
+
+
 @pytest.fixture(scope="module")
 def station_with_bolt() -> Station:
     """A bolt stands over the jig, both arms wait at home."""
@@ -129,3 +146,38 @@ def test_driver_stays_where_the_hand_would_meet_it(station_with_bolt: Station) -
         holder, holder.frame("tip"), above, holder.home, [(station.hand, "bolt_1")]
     )
     assert come_beside(station, "bolt_1", coming(station, q_hand)) == {}
+
+
+@pytest.fixture
+def station_with_far_bolt() -> Station:
+    """A bolt stands on the holder's side of the jig: from home, its palm is beside the driver."""
+    station = RunningCell(load_product("motor_unit"), CellConfig(), 0).station
+    body = station.cell.parts["bolt_1"].body
+    p_WBolt = station.cell.X_WJ.translation() * [1, 1, 0] + [-0.0204, -0.0183, 0.272]
+    station.cell.plant.SetFreeBodyPose(station.context, body, RigidTransform(p_WBolt))
+    station.look()
+    return station
+
+
+def test_the_hand_waits_where_the_driver_has_room(station_with_far_bolt: Station) -> None:
+    station, holder = station_with_far_bolt, station_with_far_bolt.holder
+
+    def clear_at(q: np.ndarray) -> bool:
+        return is_reached(station, "bolt_1", {holder.name: q})
+
+    assert not clear_at(holder.home)
+    q = parking(station, clear_at)
+    assert clear_at(q)
+    assert np.array_equal(q[1:], holder.home[1:])
+    assert np.array_equal(parking(station, lambda q: True), holder.home)
+
+
+def test_what_the_driver_would_meet_is_named(
+    station_with_far_bolt: Station, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The hand has nowhere else to wait."""
+    station = station_with_far_bolt
+    monkeypatch.setattr(counter_hold, "PARK_TURNS", [0.0])
+    step = cast(Step, SimpleNamespace(parts=("bolt_1",)))
+    with pytest.raises(Unreachable, match=r"keeps clear: left_\w+ \w+ - right_\w+ \w+ \(.* mm\)"):
+        foresee(station, step)

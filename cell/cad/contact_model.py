@@ -9,7 +9,7 @@ meet: those would touch as their convex hulls. Lengths in metres outside, in mil
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -32,6 +32,7 @@ from cell.cad.round_features import Cylinder
 from cell.cad.screw_seat import screw_seat
 from cell.cad.sdf import Contact, Piece
 from cell.cad.shapes import convex_revolve, joined, open_band, to_trimesh
+from cell.cad.slivers import without_slivers
 
 EDGE_BREAK = 0.3  # [A] Deburred edge where the CAD draws a sharp one; less on short fits [mm].
 INSET = 0.1  # The wall of a hole ends this far before both faces [mm] [D].
@@ -89,6 +90,7 @@ def contact_model(
     uses: Mapping[int, Use],
     *,
     fixed: bool,
+    shafts: Collection[int] | None = None,
 ) -> ContactModel:
     """Return the contact pieces of a part.
 
@@ -97,6 +99,8 @@ def contact_model(
         cylinders: Its round features, as `cylinders_of` finds them [m].
         uses: By number of a cylinder, what goes into it; all other holes are filled.
         fixed: Whether the fixture holds it: then it is rigid, and named for the bed.
+        shafts: Numbers of the bosses that go into holes; None: all. Others of a part that is held
+            are like the rest of it, such as round feet.
     """
     drawn = to_manifold(mesh.copy().apply_scale(1.0 / MM))
     features = {number: cylinder.scaled(1.0 / MM) for number, cylinder in enumerate(cylinders)}
@@ -129,7 +133,10 @@ def contact_model(
             surface, room = _boss(cylinder, drawn)
             rest = rest - room
             stand_ins.append(to_manifold(surface))
-            pieces.append(Piece(f"boss_{number}", _metres(surface), _metal(), convex=True))
+            in_bed = fixed and shafts is not None and number not in shafts
+            name = f"{'bed_' if in_bed else ''}boss_{number}"
+            metal = Contact(BED_FRICTION) if in_bed else _metal()
+            pieces.append(Piece(name, _metres(surface), metal, convex=True))
     bodies = convex_pieces(rest)
     contact = Contact(BED_FRICTION) if fixed else _metal(BODY_FRICTION)
     shape = to_trimesh(solid)
@@ -137,7 +144,8 @@ def contact_model(
         if not fixed:
             body = with_broken_edges(body, shape)
         name = f"{'bed' if fixed else 'body'}_{number}"
-        pieces.append(Piece(name, _metres(to_trimesh(body)), contact, convex=True))
+        surface = without_slivers(to_trimesh(body))
+        pieces.append(Piece(name, _metres(surface), contact, convex=True))
     # The walls of used holes are exact, and what their windows leave out touches nothing.
     windows = sum((_window(c, uses[n], 4) for n, c in used.items()), Manifold())
     error = error_of([*bodies, *stand_ins], solid, but=windows)

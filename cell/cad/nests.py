@@ -28,7 +28,8 @@ from cell.cad.tray import (
 
 BASE_HEIGHT = 8.0
 PEDESTAL = 30.0  # [D] Fingers reach 24 mm below the middle of their pads.
-PEDESTAL_INSET = 2.0  # Of the pedestal inside of the outline of what stands on it [A].
+# [A] Of the pedestal inside of the outline of what stands on it, at most as a share of its side.
+PEDESTAL_INSET, INSET_SHARE = 2.0, 0.25
 PLAY = 0.5  # Between a part and its stops [A]; it comes to rest within 0.07 s [M].
 STOP_THICKNESS = 3.0  # [A]
 STOP_HEIGHT, STOP_SHARE = 6.0, 0.35  # Highest stop, and as a share of the part's height [A].
@@ -85,9 +86,10 @@ def stop_nest(name: str, solid: Manifold, at: tuple[float, float]) -> Nest:
     low, high = low + p_TrayP, high + p_TrayP
     top = PEDESTAL + stop_height(solid)
     foot = solid.trim_by_plane([0, 0, -1], -(solid.bounding_box()[2] + 0.1)).bounding_box()
-    inset = PEDESTAL_INSET * np.array([1.0, 1.0, 0.0])
-    stand_low = np.array([foot[0], foot[1], 0.0]) + [*p_TrayP[:2], 0.0] + inset
-    stand_high = np.array([foot[3], foot[4], PEDESTAL]) + [*p_TrayP[:2], 0.0] - inset
+    foot_low, foot_high = np.array(foot[:2]) + p_TrayP[:2], np.array(foot[3:5]) + p_TrayP[:2]
+    inset = np.minimum(PEDESTAL_INSET, INSET_SHARE * (foot_high - foot_low))
+    stand_low = np.append(foot_low + inset, 0.0)
+    stand_high = np.append(foot_high - inset, PEDESTAL)
     boxes = [("pedestal", stand_low, stand_high)]
     for axis, other in ((0, 1), (1, 0)):
         side = high[other] - low[other]

@@ -12,6 +12,7 @@ from experiments.assembly.custom_fixture import with_fixture_for
 from experiments.assembly.prepare import RunningCell
 from planning.assembly_plan.planner import plan
 from planning.product_check.check import (
+    bed_findings,
     borne_torques,
     fixture_choices,
     fixture_findings,
@@ -58,7 +59,8 @@ def find(
     fixing = plan(product, order, config=config)
     planned, todo = plan_findings(product, fixing)
     choices = fixture_choices(product, fixing, config)
-    found += [*fixture_findings(fixing, choices), *press_findings(fixing, choices), *planned]
+    held = bed_findings(product, fixing, config)
+    found += [*held, *fixture_findings(fixing, choices), *press_findings(fixing, choices), *planned]
     running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
     borne = borne_torques(fixing, choices)
     return [*found, *simulated_findings(running.simulation, running.station, todo, borne)]

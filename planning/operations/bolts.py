@@ -10,6 +10,7 @@ from cell.products.product import Product
 from cell.workpieces.thread import Misfit
 from planning.operations.operation import Measured
 from planning.operations.snapshot import Snapshot
+from planning.operations.station import Station
 
 LEAST_PLAY = 1e-6  # Of a bolt in its hole, where it is drawn without [m].
 
@@ -22,6 +23,33 @@ def standing(screw: Screw, X_HF: RigidTransform) -> Measured:
         "standing_lateral_m": misfit.lateral,
         "standing_tilt_rad": misfit.tilt,
     }
+
+
+def seated_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP of a bolt whose head rests on what it clamps, from what is believed.
+
+    It is derived from the part that carries the thread, once that is on the fixture.
+    """
+    screw = station.cell.product.screws[bolt]
+    name = screw.into if screw.into in station.fixed else screw.clamps
+    X_WA = station.pose_of(name) @ station.part(name).X_AP.inverse()
+    return X_WA @ station.part(bolt).X_AP
+
+
+def mouth_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP of a bolt that stands on the mouth of its thread, be it there or not."""
+    out = RigidTransform([0.0, 0.0, station.cell.product.screws[bolt].thread_depth])
+    return seated_pose(station, bolt) @ out
+
+
+def standing_pose(station: Station, bolt: str) -> RigidTransform:
+    """Return X_WP at which a bolt will stand: on its thread, or by its head where there is none.
+
+    Something else below the hole, such as the bed, may stop a bolt without a thread before.
+    """
+    if station.cell.product.screws[bolt].into in station.fixed:
+        return mouth_pose(station, bolt)
+    return seated_pose(station, bolt)
 
 
 def in_hole(product: Product, bolt: str, snapshot: Snapshot) -> Measured:

@@ -1,8 +1,8 @@
-"""The gripper beside a tightening: it holds the clamped part, or keeps out of the way."""
+"""The gripper beside a tightening: it holds against the driver, or keeps out of the way."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Iterator, Mapping
+from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from enum import Enum
 
@@ -37,6 +37,9 @@ class Coming:
     jaws: np.ndarray
 
 
+# [A] Of the holder's first joint from home, where it waits, tried in this order [rad].
+PARK_TURNS = np.deg2rad([0.0, -30.0, 30.0, -60.0, 60.0])
+
 # What another arm does while the holder moves.
 Meanwhile = Callable[[Coming], Mapping[str, Command]]
 
@@ -51,24 +54,30 @@ class HoldPhase(Enum):
 
 
 def hold(
-    station: Station, part: str, meanwhile: Meanwhile, suits: Callable[[Reach], bool]
-) -> Generator[Phase, Outcome, Grasp | None]:
-    """Yield the phases with which the hand grips an assembled part; return the grasp.
+    station: Station,
+    parts: Sequence[str],
+    meanwhile: Meanwhile,
+    suits: Callable[[Reach], bool],
+    clear_at: Callable[[np.ndarray], bool],
+) -> Generator[Phase, Outcome, tuple[str, Grasp] | None]:
+    """Yield the phases with which the hand grips an assembled part; return which, and the grasp.
 
     Where no grasp from the side can be reached that suits the driver, the hand gets out of the way,
-    and the grasp is None: the fixture alone bears the torque. The belief about everything is fresh.
+    and None is returned: the fixture alone bears the torque. The belief about everything is fresh.
     `planning.operations.grasping.let_go` lets go of the part.
 
     Args:
         station: The planner's view of the cell.
-        part: Name of the part.
+        parts: Names of those that may be held, best first.
         meanwhile: What the driver does beside it.
         suits: Whether the driver reaches the bolts beside the hand.
+        clear_at: Whether the driver reaches them while the holder is at joint angles (n,) [rad].
     """
     arm, gripper = station.holder, station.cell.gripper
-    reach = next(filter(suits, from_the_side(station, part)), None)
+    found = (pair for pair in from_the_side(station, parts) if suits(pair[1]))
+    part, reach = next(found, ("", None))
     if reach is None:
-        yield from park(station, meanwhile)
+        yield from park(station, meanwhile, clear_at)
         return None
     motion = station.move(arm, reach.q_before, [(station.hand, part)])
     jaw = opened(gripper.model, reach.grasp)
@@ -92,29 +101,48 @@ def hold(
         commands={arm.name: line},
     )
     yield from grip(station, part, reach.grasp, awake=frozenset(station.fixed))
-    return reach.grasp
+    return part, reach.grasp
 
 
-def from_the_side(station: Station, part: str) -> Iterator[Reach]:
-    """Yield grasps that leave the space above the part to the driver."""
-    X_WP = station.pose_of(part)
-    grasps = [
-        grasp
-        for grasp in station.part(part).grasps
-        if abs((X_WP @ grasp.X_PJaw).rotation().matrix()[2, 2]) < 0.5
-    ]
-    return reachable_grasps(station, part, X_WP, grasps)
+def from_the_side(station: Station, parts: Sequence[str]) -> Iterator[tuple[str, Reach]]:
+    """Yield grasps that leave the space above each part to the driver, with the part's name."""
+    for part in parts:
+        X_WP = station.pose_of(part)
+        grasps = [
+            grasp
+            for grasp in station.part(part).grasps
+            if abs((X_WP @ grasp.X_PJaw).rotation().matrix()[2, 2]) < 0.5
+        ]
+        for reach in reachable_grasps(station, part, X_WP, grasps):
+            yield part, reach
 
 
-def park(station: Station, meanwhile: Meanwhile) -> Iterator[Phase]:
-    """Yield the phase that takes the holder home, out of the driver's way."""
+def parking(station: Station, clear_at: Callable[[np.ndarray], bool]) -> np.ndarray:
+    """Return joint angles (n,) of the holder that leave the driver room; home if none do [rad].
+
+    It goes home, or turns further away about its base. Arguments as of `hold`.
+    """
     arm = station.holder
-    motion = station.move(arm, arm.home)
+    for turn in PARK_TURNS:
+        q = arm.home.copy()
+        q[0] += turn
+        station.model.arrange(station.surroundings())
+        if station.model.is_free(arm.name, q) and clear_at(q):
+            return q
+    return arm.home
+
+
+def park(
+    station: Station, meanwhile: Meanwhile, clear_at: Callable[[np.ndarray], bool]
+) -> Iterator[Phase]:
+    """Yield the phase that takes the holder out of the driver's way; arguments as of `hold`."""
+    arm, q_park = station.holder, parking(station, clear_at)
+    motion = station.move(arm, q_park)
     jaws = station.cell.plant.GetPositions(station.context, arm.tool_instance)
     yield Phase(
         HoldPhase.PARK,
         motion_finished,
         20.0,
         subject=f"{arm.name} arm",
-        commands={arm.name: motion, **meanwhile(Coming(motion, arm.home, jaws))},
+        commands={arm.name: motion, **meanwhile(Coming(motion, q_park, jaws))},
     )

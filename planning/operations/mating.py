@@ -15,6 +15,7 @@ from cell.products.joints import Fit, Press
 from cell.products.product import Grasp, Product
 from cell.simulation.phase import Phase, motion_finished
 from planning.feasibility.directions import unit_vector
+from planning.operations.bolts import standing_pose
 from planning.operations.grasping import (
     Reach,
     comes_from_above,
@@ -127,6 +128,10 @@ def mate(
     )
     yield from soft(SoftHand(station, mating, X_WGoal, reach.grasp, X_JawP, both))
     yield from let_go(station, part, reach.grasp, RETREAT, both)
+    # Who cannot see a bolt knows it by what it has come to stand on, not by the hand it rode in.
+    for bolt in riders:
+        if bolt in station.cell.product.screws:
+            station.belief.rest(bolt, standing_pose(station, bolt))
 
 
 def foresee_mating(station: Station, mating: Mating, suits: Suits | None = None) -> None:

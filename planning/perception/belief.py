@@ -23,6 +23,11 @@ from cell.workpieces.parts import Parts
 State = dict[str, np.ndarray]
 SEEN, CARRIED, SOURCE = "seen/", "carried/", "source"  # Keys of a saved belief.
 NEVER = -np.inf  # Time of an estimate that no look has confirmed [s].
+# By which a part turns and slides as it is gripped and carried: standard deviations about all axes,
+# and along x, y and z of the hand [rad], [m] [A]. Along x, in which the pads close, it hardly does.
+# As it is let go, it does so by as much, along all axes.
+TURNED, SLID = np.deg2rad(4.0), np.array([3e-4, 2e-3, 2e-3])
+LET_GO = np.diag(np.repeat([TURNED, SLID.max()], 3) ** 2)
 
 
 @dataclass(frozen=True)
@@ -83,6 +88,48 @@ class CarriedSource(Source, Protocol):
 
     def take(self) -> None:
         """Take in what is in sight now; everything stands still."""
+
+
+@runtime_checkable
+class WatchingSource(Source, Protocol):
+    """A source with an eye that stands still: it sees what the hand shows to it."""
+
+    def stops(self, part: str, X_HP: RigidTransform) -> list[RigidTransform]:
+        """Return poses X_WH of the hand H at which what it holds may be in sight.
+
+        Args:
+            part: Name of the part in the hand.
+            X_HP: How it is believed to lie there.
+        """
+        ...
+
+    def visible(self, part: str, X_HP: RigidTransform, q: np.ndarray) -> float:
+        """Return the share of a part's surface that is in sight with the arm at ``q`` (n,) [rad].
+
+        Args:
+            part: Name of the part in the hand.
+            X_HP: How it is believed to lie there.
+            q: Joint angles (n,) [rad].
+        """
+        ...
+
+    def watch(self, part: str, X_HP: RigidTransform) -> None:
+        """Take in what is in sight now of a part in the hand; everything stands still."""
+
+
+def gripped(X_WP: RigidTransform, X_WH: RigidTransform) -> np.ndarray:
+    """Return the covariance (6, 6), see `Estimate`, of what gripping does to the pose of a part.
+
+    Args:
+        X_WP: Of the part.
+        X_WH: Of the hand; the part turns about its origin, between the pads.
+    """
+    R_WH = X_WH.rotation().matrix()
+    p_HP_W = X_WP.translation() - X_WH.translation()
+    J = np.zeros((6, 6))
+    J[:3, :3], J[3:, 3:] = X_WP.rotation().matrix().T @ R_WH, R_WH
+    J[3:, :3] = np.cross(R_WH.T, p_HP_W).T  # A turn about the pads shifts the part's origin.
+    return np.asarray(J @ np.diag(np.r_[np.full(3, TURNED), SLID] ** 2) @ J.T)
 
 
 def random_state(rng: np.random.Generator) -> np.ndarray:
@@ -211,13 +258,20 @@ class Belief:
         return X_WP if X_WH.IsExactlyEqualTo(X_WH_then) else X_WH @ X_WH_then.inverse() @ X_WP
 
     def carry(self, parts: Iterable[str]) -> None:
-        """Let parts follow the hand from now on."""
+        """Let parts follow the hand from now on; they are less certain than they stood."""
         self.carried = dict.fromkeys(parts, self.hand())
+        for part in self.carried.keys() & self.estimates.keys():
+            known = self.estimates[part]
+            spread = known.covariance + gripped(known.X_WP, self.carried[part])
+            self.estimates[part] = replace(known, covariance=spread)
 
     def put_down(self) -> None:
-        """Leave the parts in the hand where they are believed to be now."""
+        """Leave the parts in the hand where they are believed to be now, less certain."""
         for part in self.carried:
-            self.estimates[part] = replace(self.estimates[part], X_WP=self.pose(part))
+            spread = self.estimates[part].covariance + LET_GO
+            self.estimates[part] = replace(
+                self.estimates[part], X_WP=self.pose(part), covariance=spread
+            )
         self.carried = {}
 
     def save(self) -> State:

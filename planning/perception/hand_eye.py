@@ -5,25 +5,30 @@ is registered against its mesh, from where it is believed to be. Parts that noth
 yet are taken to be in the tray: the tray with its parts is registered first, as one, and every part
 is expected in its place there. For parts that are too small for the camera, such as bolts, that is
 all that is known: a place in a rack whose pose has been seen.
+
+A part in the hand is in sight of the camera that is fixed above the jig, as far as the hand does
+not hide it. What rides on it goes along with what is seen of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from pydrake.math import RigidTransform
 from pydrake.multibody.tree import Frame
 from pydrake.systems.framework import Context
 
 from cell.builder import Cell
 from cell.configuration.config import CellConfig
-from cell.machines.cameras.camera import HAND_EYE, Camera, Picture
+from cell.machines.cameras.camera import ABOVE, HAND_EYE, Camera, Picture
 from cell.products.product import Product
 from planning.perception.belief import NEVER, Estimate, random_state, restore_random_state
+from planning.perception.in_hand import InHand
 from planning.perception.layout import parts_in_tray, tray_expected
-from planning.perception.registration import register, starts_within, views_of
+from planning.perception.registration import View, near_to, register, starts_within, views_of
 from planning.perception.surface import Surface
 
 Array = NDArray[np.float64]
@@ -35,6 +40,9 @@ TOGETHER = 0.06  # Parts no further apart are looked at together [m] [A].
 # Least share of the points near a part that have a partner on it [M]: 0.8 and more if it is found,
 # 0.6 for the tray with its parts, 0.2 where there is something else.
 SHARE = 0.4
+# By which a part that nobody handled may have moved since it was seen: by what else was done there.
+# Standard deviations about and along each axis [rad], [m] [A].
+MOVED = np.diag(np.repeat([np.deg2rad(0.5), 5e-4], 3) ** 2)
 NEST = 2e-3  # A part further from its place in the tray is not there, or that is not the tray [m].
 
 
@@ -48,6 +56,7 @@ class HandEye:
         product: Its parts, and the tray.
         tray: Where that is expected.
         rng: Of the depth noise.
+        in_hand: What the fixed camera sees of the part in the hand.
         duration: See `planning.perception.belief.Source`; the hand stands still by itself.
         pictures: Taken since the latest look.
     """
@@ -57,6 +66,7 @@ class HandEye:
     product: Product
     tray: Estimate
     rng: np.random.Generator
+    in_hand: InHand
     duration: float = 0.0
     pictures: list[Picture] = field(default_factory=list)
     _surfaces: dict[str, Surface] = field(default_factory=dict)
@@ -73,7 +83,9 @@ class HandEye:
             seed: Of the depth noise.
         """
         rng = np.random.default_rng([seed, 2])
-        return HandEye(cell.cameras[HAND_EYE], root, cell.product, tray_expected(config), rng)
+        camera, fixed = cell.cameras[HAND_EYE], cell.cameras[ABOVE]
+        in_hand = InHand(fixed, cell.holder, root, camera)
+        return HandEye(camera, root, cell.product, tray_expected(config), rng, in_hand)
 
     @property
     def frame(self) -> Frame:
@@ -100,8 +112,25 @@ class HandEye:
         """Take a picture."""
         self.pictures.append(self.camera.take(self.root, self.rng))
 
+    def stops(self, part: str, X_HP: RigidTransform) -> list[RigidTransform]:
+        """Return poses X_WH of the hand at which the fixed camera may see what it holds."""
+        return self.in_hand.stops(self._surface(part), X_HP)
+
+    def visible(self, part: str, X_HP: RigidTransform, q: Array) -> float:
+        """Return the share of a part's surface that it sees with the arm at ``q`` (n,) [rad]."""
+        return self.in_hand.visible(self._surface(part), X_HP, q)
+
+    def watch(self, part: str, X_HP: RigidTransform) -> None:
+        """Take a picture of the part in the hand with the fixed camera."""
+        self.in_hand.watch(self._surface(part), X_HP, self.rng)
+
     def look(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
-        """Return what the pictures since the latest look show; without any, nothing."""
+        """Return what the pictures since the latest look show; without any, nothing.
+
+        With pictures of the part in the hand, it is the first of the parts, and others ride on it.
+        """
+        if self.in_hand.views:
+            return self._held(parts, known)
         pictures, self.pictures = self.pictures, []
         if not pictures:
             return {}
@@ -117,6 +146,20 @@ class HandEye:
                 if found is not None:
                     seen[name] = found
         return seen
+
+    def _held(self, parts: Sequence[str], known: Mapping[str, Estimate]) -> dict[str, Estimate]:
+        """Return where the part in the hand is, the first one, and what rides on it."""
+        prior, surface = known[parts[0]], self._surface(parts[0])
+        views = [near_to(view, surface, prior.X_WP, self.rng) for view in self.in_hand.views_now()]
+        found = self._fitted(surface, views, prior)
+        if found is None:
+            return {}
+        X_WOld = prior.X_WP.inverse()
+        riders = {
+            name: replace(known[name], X_WP=found.X_WP @ X_WOld @ known[name].X_WP, time=found.time)
+            for name in parts[1:]
+        }
+        return {parts[0]: found, **riders}
 
     def _in_tray(
         self, pictures: Sequence[Picture], known: Mapping[str, Estimate]
@@ -135,12 +178,21 @@ class HandEye:
         self, surface: Surface, pictures: Sequence[Picture], prior: Estimate
     ) -> Estimate | None:
         """Return the estimate of what has a surface, None if it is not there."""
-        views = views_of(pictures, surface, prior.X_WP, self.rng)
-        more = starts_within(prior.X_WP, prior.covariance) if prior.time == NEVER else ()
-        found = register(surface, views, prior.X_WP, more)
+        return self._fitted(surface, views_of(pictures, surface, prior.X_WP, self.rng), prior)
+
+    def _fitted(self, surface: Surface, views: Sequence[View], prior: Estimate) -> Estimate | None:
+        """Return the estimate that fits views, None if what they show is something else.
+
+        What has been seen before holds what is hardly in sight.
+        """
+        if prior.time == NEVER:
+            more = starts_within(prior.X_WP, prior.covariance)
+            found = register(surface, views, prior.X_WP, more)
+        else:
+            found = register(surface, views, prior.X_WP, covariance=prior.covariance + MOVED)
         if found is None or found.share < SHARE:
             return None
-        return Estimate(found.X_WP, found.covariance, pictures[-1].time)
+        return Estimate(found.X_WP, found.covariance, self.root.get_time())
 
     def _surface(self, name: str) -> Surface:
         if name not in self._surfaces:
@@ -167,7 +219,7 @@ class HandEye:
     def restore(self, state: np.ndarray) -> None:
         """Return to a saved state of the random generator."""
         restore_random_state(self.rng, state)
-        self.pictures = []
+        self.pictures, self.in_hand.views = [], []
 
 
 def _apart(one: Estimate, other: Estimate) -> float:

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from cell.configuration.config import CellConfig
+from cell.fixtures.soft_jig.bed_pieces import bed_pieces
 from cell.machines.arm import Unreachable
 from cell.products.product import Product
 from cell.simulation.simulation import Simulation
@@ -18,23 +19,29 @@ from planning.motion.paths import NoPath
 from planning.operations.operation import NoOperation, Step
 from planning.operations.sequence import steps
 from planning.operations.station import Station
+from planning.product_check.drawn_support import support_findings
 from planning.product_check.finding import Finding, Level, doubtful, fails, good
 from planning.product_check.machine_limits import machine_findings
 from planning.product_check.standing_clear import clearance_findings
+from planning.product_draft.unknown_screws import unknown_screws
 
 
 def plan_findings(product: Product, fixing: FixingPlan) -> tuple[list[Finding], list[Step]]:
     """Return findings on a plan, and the steps that carry it out; none if it cannot be."""
+    unknown = [fails(n, text) for n, text in unknown_screws(fixing, product.screws).items()]
     if fixing.stop is not None or fixing.unplanned:
         reasons = [f"{item.name} {item.reason}" for item in fixing.unplanned]
         reasons += [stop_text(fixing)] if fixing.stop else []
-        return [fails("order", "; ".join(reasons))], []
+        return [*unknown, fails("order", "; ".join(reasons))], []
     try:
         todo = steps(product, fixing)
     except NoOperation as error:
-        return [fails("order", str(error))], []
+        return [*unknown, fails("order", str(error))], []
+    if unknown:
+        return unknown, []
     names = ", ".join(step.name for step in todo)
-    return [good("order", f"every step has an operation: {names}")], todo
+    found = [good("order", f"every step has an operation: {names}")]
+    return [*found, *support_findings(product, fixing.order)], todo
 
 
 def fixture_choices(product: Product, fixing: FixingPlan, config: CellConfig) -> tuple[Choice, ...]:
@@ -55,6 +62,17 @@ def fixture_findings(fixing: FixingPlan, choices: Sequence[Choice]) -> Iterator[
             yield doubtful(step.fixed_part, f"on the jig while {step.item} is added: {rejected}")
     if choices and not said:
         yield good(fixing.steps[0].fixed_part, "the bag holds it, by size, depth and stability")
+
+
+def bed_findings(product: Product, fixing: FixingPlan, config: CellConfig) -> Iterator[Finding]:
+    """Yield the fixed parts of a plan of whose contact models nothing touches the jig's bed."""
+    if config.workcell.fixture != "soft_jig":
+        return
+    for name in dict.fromkeys(step.fixed_part for step in fixing.steps):
+        part, membrane = product.parts[name], config.jig.jammed.friction
+        if part.model is not None and not bed_pieces(part.model, part.mesh, membrane).own:
+            text = "the jig cannot hold it: no piece of its contact model is named bed_..."
+            yield fails(name, f"{text}; a shaft that another part comes over is none")
 
 
 def borne_torques(fixing: FixingPlan, choices: Sequence[Choice]) -> dict[str, float]:
@@ -104,7 +122,8 @@ def reach_findings(
             weak = [n for n in step.parts if borne.get(n, np.inf) < screws[n].torque]
             if weak:
                 asked = max(screws[name].torque for name in weak)
-                yield fails(step.name, f"{remark}, {borne[weak[0]]:.2g} of {asked:.2g} N m")
+                bears = f"{borne[weak[0]]:.2g} of {asked:.2g} N m"
+                yield fails(step.name, f"{remark}, {bears}; init --torque asks for less")
             else:
                 yield doubtful(step.name, remark)
 
@@ -123,6 +142,7 @@ def simulated_findings(
 
 
 __all__ = [
+    "bed_findings",
     "borne_torques",
     "fixture_choices",
     "fixture_findings",

@@ -8,12 +8,13 @@ from cell.configuration.config import CellConfig
 from cell.errors import UnknownName
 from cell.machines.arms import arm_model
 from cell.machines.driver import largest_torque
-from cell.machines.grippers import GRIPPER_MODELS, GripperModel, too_wide
+from cell.machines.grippers import GRIPPER_MODELS, GripperModel
 from cell.products.drives import BITS
 from cell.products.product import Part, Product
-from cell.vectors import rotation_with_up
-from planning.fixture_analysis.footprint import footprint
+from planning.feasibility.directions import unit_vector
 from planning.product_check.finding import Finding, doubtful, fails, good
+from planning.product_draft.hand_shape import HandShape
+from planning.product_draft.no_grasp import why_no_grasp
 
 LEAST_ROOM = 5e-4  # [A] The jaws open this much wider than the part at least, on both sides [m].
 DENSEST, LIGHTEST = 22600.0, 20.0  # [kg/m3] Osmium; foam.
@@ -55,12 +56,7 @@ def _mass(part: Part, gripper: GripperModel, payload: float) -> Iterator[Finding
 
 def _grasps(part: Part, gripper: GripperModel, up: str) -> Iterator[Finding]:
     if not part.grasps:
-        R_UpP = rotation_with_up(up) @ part.X_AP.rotation()
-        outline = footprint((part.mesh.vertices @ R_UpP.matrix().T)[:, :2])
-        width = 0.0 if outline is None else outline.narrowest
-        given = "give it one in the product file"
-        reason = too_wide(gripper, width) if width > gripper.stroke else given
-        yield fails(part.name, f"it has no grasp; {reason}")
+        yield fails(part.name, f"it has no grasp; {_why_no_grasp(part, gripper, up)}")
         return
     usable = 0
     for grasp in part.grasps:
@@ -82,6 +78,15 @@ def _grasps(part: Part, gripper: GripperModel, up: str) -> Iterator[Finding]:
             usable += 1
     if not usable:
         yield fails(part.name, f"none of its grasps suits {gripper.name}")
+
+
+def _why_no_grasp(part: Part, gripper: GripperModel, up: str) -> str:
+    """Return what is known without what is around: `soft-jig init` knows that."""
+    mesh = part.mesh.copy()
+    mesh.apply_transform(part.X_AP.GetAsMatrix4())
+    alone = why_no_grasp(mesh, part.mass, HandShape(gripper), unit_vector(up), {})
+    around = "jaws fit it, but not beside what is around it in the tray or where it goes"
+    return alone or f"{around}: soft-jig init says what; give it one in the product file"
 
 
 def _screws(product: Product, config: CellConfig) -> Iterator[Finding]:

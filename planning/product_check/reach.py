@@ -5,12 +5,12 @@ Each step of the plan is foreseen with one grasp at a time, as `soft-jig check` 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
 from cell.machines.arm import Unreachable
-from cell.products.product import Grasp, Part, Product
+from cell.products.product import Grasp, Product
 from planning.motion.paths import NoPath
 from planning.operations.operation import NoOperation, Role, Step
 from planning.operations.station import Station
@@ -28,9 +28,10 @@ def reached_grasps(station: Station, todo: Sequence[Step]) -> dict[str, tuple[Gr
     reached: dict[str, tuple[Grasp, ...]] = {}
     station.look()
     for step in todo:
-        name = _gripped(station.cell.product, step)
-        if name is not None:
-            found = tuple(g for g in station.part(name).grasps if _does(station, step, name, g))
+        names = _gripped(station.cell.product, step)
+        for name in names:
+            grasps = station.part(name).grasps
+            found = tuple(g for g in grasps if _does(station, step, names, {name: (g,)}))
             reached[name] = (*reached.get(name, ()), *found)
         try:
             step.operation.foresee(station, step)
@@ -40,19 +41,23 @@ def reached_grasps(station: Station, todo: Sequence[Step]) -> dict[str, tuple[Gr
     return reached
 
 
-def _gripped(product: Product, step: Step) -> str | None:
-    """Return the part with several grasps that the hand grips in a step."""
+def _gripped(product: Product, step: Step) -> tuple[str, ...]:
+    """Return the parts with several grasps, any of which the hand grips in a step."""
     bolts = [name for name in step.parts if name in product.screws]
     if step.operation.role is Role.FINISH and bolts:
-        return product.screws[bolts[0]].clamps
-    return step.parts[0] if len(step.parts) == 1 and not bolts else None
+        return product.screws[bolts[0]].clamps, product.screws[bolts[0]].into
+    return step.parts if len(step.parts) == 1 and not bolts else ()
 
 
-def _does(station: Station, step: Step, name: str, grasp: Grasp) -> bool:
-    """Return whether a step can be done, without a remark, if a part has this grasp only."""
+def _does(
+    station: Station, step: Step, names: Sequence[str], grasps: Mapping[str, tuple[Grasp, ...]]
+) -> bool:
+    """Return whether a step can be done, without a remark, if parts have these grasps only."""
+    parts = dict(station.cell.product.parts)
+    for name in names:
+        parts[name] = replace(parts[name], grasps=grasps.get(name, ()))
     trial = copy(station)
-    only = replace(station.part(name), grasps=(grasp,))
-    trial.cell = replace(station.cell, product=_with(station.cell.product, only))
+    trial.cell = replace(station.cell, product=replace(station.cell.product, parts=parts))
     trial.belief = copy(station.belief)
     trial.belief.estimates = dict(station.belief.estimates)
     trial.origins = dict(station.origins)
@@ -60,7 +65,3 @@ def _does(station: Station, step: Step, name: str, grasp: Grasp) -> bool:
         return not step.operation.foresee(trial, step)
     except (Unreachable, NoPath, NoOperation):
         return False
-
-
-def _with(product: Product, part: Part) -> Product:
-    return replace(product, parts={**product.parts, part.name: part})

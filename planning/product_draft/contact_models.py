@@ -8,7 +8,7 @@ from cell.cad.contact_model import ContactModel, Use, contact_model
 from cell.cad.convex_pieces import to_manifold
 from cell.cad.round_features import Cylinder
 from planning.product_draft.guess import Guess
-from planning.product_draft.joint_guesses import LINE_TO_LINE, SLIDING
+from planning.product_draft.joint_guesses import LINE_TO_LINE, SLIDING, shafts_of
 from planning.product_draft.recognised import Recognised
 
 GOOD_SHARE, GOOD_SURFACE = 0.02, 0.3  # [A] Errors of volume, and of the surface [mm].
@@ -24,7 +24,9 @@ def contact_models(seen: Recognised) -> tuple[dict[str, ContactModel], list[Gues
     for name, mesh in seen.meshes.items():
         if name in seen.screw_named:
             continue
-        model = contact_model(mesh, seen.features[name], uses[name], fixed=name == seen.base)
+        features, fixed = seen.features[name], name == seen.base
+        shafts = shafts_of(name, seen.features)
+        model = contact_model(mesh, features, uses[name], fixed=fixed, shafts=shafts)
         models[name] = model
         guesses.append(_guess(name, model))
     return models, guesses

@@ -13,6 +13,7 @@ import numpy as np
 import trimesh
 
 CELL = 1e-3  # [A] Of the grid [m]: a third of the narrowest jaw.
+FACING = 0.89  # [D] Cosine of the angle of friction of a pad on metal: tan 27 degrees = 0.5.
 TOUCH = 1e-4  # [A] What stands back less touches a rubber pad [m]; 40 N press it in by as much [M].
 
 
@@ -23,12 +24,14 @@ class DepthMaps:
     Attributes:
         y, z: (n,), (m,) places of the grid along both axes of a jaw's face [m].
         far, near: (n, m) outermost x towards +x and towards -x [m]; -inf, inf where nothing is.
+        facing: (n, m) whether both surfaces there face the jaws: steeper ones slip off their edges.
     """
 
     y: np.ndarray
     z: np.ndarray
     far: np.ndarray
     near: np.ndarray
+    facing: np.ndarray
 
     @staticmethod
     def of(mesh: trimesh.Trimesh, R: np.ndarray) -> DepthMaps:
@@ -38,7 +41,9 @@ class DepthMaps:
         y = np.arange(low[1] + CELL / 2, high[1], CELL)
         z = np.arange(low[2] + CELL / 2, high[2], CELL)
         far, near = np.full((len(y), len(z)), -np.inf), np.full((len(y), len(z)), np.inf)
-        for triangle in corners:
+        far_faces, near_faces = np.zeros(far.shape, bool), np.zeros(far.shape, bool)
+        faces = np.abs(mesh.face_normals @ R[:, 0]) > FACING
+        for triangle, face in zip(corners, faces, strict=True):
             first, last = triangle[:, 1:].min(axis=0), triangle[:, 1:].max(axis=0)
             i = np.searchsorted(y, [first[0] - 1e-9, last[0] + 1e-9])
             k = np.searchsorted(z, [first[1] - 1e-9, last[1] + 1e-9])
@@ -54,9 +59,10 @@ class DepthMaps:
             inside = (s >= -1e-9) & (t >= -1e-9) & (s + t <= 1 + 1e-9)
             x = ax + s * (bx - ax) + t * (cx - ax)
             at = np.s_[i[0] : i[1], k[0] : k[1]]
-            far[at] = np.where(inside, np.maximum(far[at], x), far[at])
-            near[at] = np.where(inside, np.minimum(near[at], x), near[at])
-        return DepthMaps(y, z, far, near)
+            farther, nearer = inside & (x > far[at]), inside & (x < near[at])
+            far[at][farther], near[at][nearer] = x[farther], x[nearer]
+            far_faces[at][farther], near_faces[at][nearer] = face, face
+        return DepthMaps(y, z, far, near, far_faces & near_faces)
 
     def grip(self, y: tuple[float, float], z: tuple[float, float]) -> Grip | None:
         """Return what two jaws meet whose faces span these ranges [m].
@@ -69,7 +75,7 @@ class DepthMaps:
             return None
         top, bottom = float(far.max()), float(near.min())
         on_far, on_near = far > top - TOUCH, near < bottom + TOUCH
-        both = on_far & on_near
+        both = on_far & on_near & self.facing[i:j, k:m]
         count = int(both.sum())
         if top == -np.inf or count == 0:
             return None

@@ -24,6 +24,8 @@ from cell.products.product import Product
 from planning.assembly_plan.explain import stop_text
 from planning.assembly_plan.planner import FixingPlan, plan
 from planning.feasibility.directions import unit_vector
+from planning.fixture_analysis.candidate import FixtureSetup
+from planning.product_draft.bed_reach import bed_reach
 from planning.product_draft.contact_models import contact_models
 from planning.product_draft.grasps import part_grasps, screw_grasp
 from planning.product_draft.guess import Guess
@@ -32,6 +34,7 @@ from planning.product_draft.joint_guesses import ScrewGuess, guess_fits, guess_s
 from planning.product_draft.joints import Joining
 from planning.product_draft.part_models import plain, write_parts, write_tray
 from planning.product_draft.recognised import Recognised, placed
+from planning.product_draft.unknown_screws import unknown_screws
 
 
 @dataclass(frozen=True)
@@ -105,10 +108,13 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
     pushed = _grip_forces(joints, place, options.config)
     gripped = {}
     hand = _hand(options.config)
+    imprint = bed_reach(meshes[base], product.up, FixtureSetup.of(options.config))
     for name, part in waiting.items():
         if name in seen.screw_named:
             gripped[name] = replace(part, grasps=(screw_grasp(seen.screw_named[name]),))
             continue
+        own = [screw for screw in screws if name in (screw.clamps, screw.into)]
+        there = set().union(*(seen.before(screw.part) for screw in own)) - {name}
         grasps, more = part_grasps(
             part,
             hand,
@@ -116,7 +122,9 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
             base=meshes[base],
             earlier={other: meshes[other] for other in sorted(seen.before(name))},
             nest=nests[name][1],
-            screws=[screw for screw in screws if screw.clamps == name],
+            imprint=imprint,
+            screws=own,
+            beside={other: meshes[other] for other in sorted(there - set(seen.screw_named))},
             apart=options.config.motion.arm_clearance,
             wanted=pushed.get(name, 0.0),
         )
@@ -179,10 +187,14 @@ def _planned(
         RunFailure: There is none.
     """
     best = plan(product, options.order, config=options.config)
+    unknown = unknown_screws(best, screws)
+    guesses += [Guess(name, "not taken for a screw", text, 0.7) for name, text in unknown.items()]
+    # The cause comes first: the rest may be cut off.
+    hints = "".join(f"{name}: {text}. " for name, text in unknown.items())
     if best.stop is not None or best.unplanned:
         reason = "; ".join(f"{item.name} {item.reason}" for item in best.unplanned)
         reason = stop_text(best) if best.stop else reason
-        raise RunFailure(f"No order to assemble '{product.name}': {reason}")
+        raise RunFailure(f"{hints}No order to assemble '{product.name}': {reason}.")
     others = best.orders.ranked if best.orders and options.order is None else ()
     for order in (best.order, *(r.order for r in others if r.refixings == 0)):
         found = best if order == best.order else plan(product, order, config=options.config)
@@ -194,8 +206,8 @@ def _planned(
             return found
     names = ", then ".join(dict.fromkeys(step.fixed_part for step in best.steps))
     raise RunFailure(
-        f"Every order of '{product.name}' fixes more than one part, the best {names}: contact "
-        "models are made for one. --order A,B,C asks for another order."
+        f"{hints}Every order of '{product.name}' fixes more than one part, the best {names}: "
+        "contact models are made for one. --order A,B,C asks for another order."
     )
 
 

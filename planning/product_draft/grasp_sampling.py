@@ -24,6 +24,7 @@ LEAST_AREA = 5e-6  # [D] Of contact [m2]: a nose on the head of an M3 cap screw 
 HOLD_AREA = 1e-5  # [A] At least, against a driver: noses slid off 6 mm2, and held by 16 [M] [m2].
 GOOD_AREA = 1.5e-4  # [A] More is no better [m2].
 STEP = 2.5e-3  # Between jaw places on a part [m].
+FINE = 1e-3  # The same along the approach, where the coarse ones leave no room: low hubs [m].
 FACES = 0.95  # Cosine of 18 degrees: what looks along the approach.
 LEVELS, MOST_LEVELS = 5, 4  # [A] Undersides: digits to which heights are one [m], how many.
 SIDES_WANTED = 8  # [A] Closing directions, those with the most area.
@@ -41,6 +42,8 @@ GRAVITY = 9.81
 LIFT_FACTOR = 10.0  # [A] Grip over the weight that friction just bears: an arm brakes.
 # [A] Of a pad by the grip [m]: jaws that close 1.5 mm further than expected have lost the part.
 SQUEEZED = 5e-4
+# [M] Of it by the usual grip: 40 N on 8 mm2 of a round hub let it slip out, 15 N held it [-].
+USUAL_SHARE = 0.5
 USUAL_FORCE, LIGHT = 40.0, 5e-3  # [A] As of the products drawn by hand [N]; lighter: less [kg].
 
 
@@ -86,18 +89,21 @@ def sample_grasps(
     # Held where it is assembled, jaws may close on what is flush with it, too: that holds as well.
     tight = -TIGHT if from_side else TIGHT
     found: list[RankedGrasp] = []
-    for R in _orientations(mesh, up, from_side):
-        maps = DepthMaps.of(mesh, R)
-        kept = 0
-        for ranked in _best_first(list(_places(mesh, hand, maps, R)), mass, hand, maps, R, wanted):
-            if from_side and ranked.area < HOLD_AREA:
-                continue
-            if kept == 2:
-                break
-            if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around, tight):
-                continue
-            found.append(ranked)
-            kept += 1
+    for step in (STEP,) if from_side else (STEP, FINE):
+        for R in _orientations(mesh, up, from_side):
+            maps = DepthMaps.of(mesh, R)
+            places, kept = list(_places(mesh, hand, maps, R, step)), 0
+            for ranked in _best_first(places, mass, hand, maps, R, wanted):
+                if from_side and ranked.area < HOLD_AREA:
+                    continue
+                if kept == 2:
+                    break
+                if _is_near(ranked, found) or not _is_clear(ranked.grasp, hand, own, around, tight):
+                    continue
+                found.append(ranked)
+                kept += 1
+        if found:
+            break
     found.sort(key=lambda g: -g.score)
     return _named(found[:KEPT], "side" if from_side else "top")
 
@@ -175,9 +181,9 @@ def _best_first(
 
 
 def _places(
-    mesh: trimesh.Trimesh, hand: HandShape, maps: DepthMaps, R: np.ndarray
+    mesh: trimesh.Trimesh, hand: HandShape, maps: DepthMaps, R: np.ndarray, step: float
 ) -> Iterator[_Place]:
-    """Yield the places of all jaws along R."""
+    """Yield the places of all jaws along R, a step apart along the approach [m]."""
     p_Com = mesh.center_mass @ R
     setback = 1e-3
     undersides = _undersides(mesh, R[:, 2])
@@ -185,8 +191,8 @@ def _places(
         half_y, half_z = (size / 2.0 for size in hand.faces[jaw].size)
         # Besides, with the end of the jaw just above what the part may stand on.
         ends = np.subtract.outer(undersides - half_z, ABOVE_GROUND).ravel()
-        zs = [*_steps(maps.z, p_Com[2], half_z - setback), *ends]
-        for y in _steps(maps.y, p_Com[1], half_y):
+        zs = [*_steps(maps.z, p_Com[2], half_z - setback, step), *ends]
+        for y in _steps(maps.y, p_Com[1], half_y, STEP):
             lever = abs(y - p_Com[1])
             for z in zs:
                 bound = 1.0 - 30.0 * lever - 5.0 * abs(z - p_Com[2])
@@ -231,11 +237,11 @@ def _grasp_at(
     return RankedGrasp(grasp, score, grip.area, place.lever)
 
 
-def _steps(grid: np.ndarray, middle: float, half: float) -> np.ndarray:
+def _steps(grid: np.ndarray, middle: float, half: float, step: float) -> np.ndarray:
     """Return the places of a face that meets a part, from the middle outwards."""
-    low, high = grid[0] - half + STEP, grid[-1] + half - STEP
-    steps = np.arange(np.ceil((low - middle) / STEP), np.floor((high - middle) / STEP) + 1)
-    return middle + STEP * steps[np.argsort(np.abs(steps), kind="stable")]
+    low, high = grid[0] - half + step, grid[-1] + half - step
+    steps = np.arange(np.ceil((low - middle) / step), np.floor((high - middle) / step) + 1)
+    return middle + step * steps[np.argsort(np.abs(steps), kind="stable")]
 
 
 def _force(mass: float, lever: float, spread: float, most: float, wanted: float) -> float | None:
@@ -254,9 +260,9 @@ def _force(mass: float, lever: float, spread: float, most: float, wanted: float)
     bears = weight / (2.0 * PAD_FRICTION)
     turns = weight * lever / (2.0 * PAD_FRICTION * max(spread, 5e-4))
     needed = max(LIFT_FACTOR * bears, 2.0 * turns, LEAST_FORCE)
+    usual = min(USUAL_FORCE if mass > LIGHT else LEAST_FORCE, USUAL_SHARE * most)
     most = min(most, LARGEST_FORCE)
-    usual = max(wanted, USUAL_FORCE if mass > LIGHT else LEAST_FORCE)
-    return None if needed > most else float(np.ceil(max(needed, min(usual, most))))
+    return None if needed > most else float(np.ceil(max(needed, usual, min(wanted, most))))
 
 
 def _is_near(ranked: RankedGrasp, found: Sequence[RankedGrasp]) -> bool:

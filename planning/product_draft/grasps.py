@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 
+import fcl
 import numpy as np
 import trimesh
 from pydrake.math import RigidTransform, RotationMatrix
@@ -24,7 +26,10 @@ from planning.product_draft.hand_shape import HandShape, surface
 from planning.product_draft.joint_guesses import ScrewGuess
 from planning.product_draft.no_grasp import why_no_grasp
 
-BED_RISE = 0.016  # [M] The bed reaches this far up a part that is pressed in [m].
+# The bed reaches this far up a narrow part that is pressed in [m] [M]; where that leaves the hand
+# no room, or only poor grasps, as far as the planner's imprint says, and its error more.
+BED_RISE, IMPRINT_ERROR = 0.016, 0.002
+POOR = 0.0  # [A] Score of a grasp that is too far from the mass centre for what it touches.
 BED_SIDE = 0.3  # Of the plane that stands for it [m].
 NOSE_HEIGHT = 1.8e-3  # [D] 0.3 mm between the nose and what the head rests on [m].
 SCREW_FORCE = 5.0  # [A] [N].
@@ -39,7 +44,9 @@ def part_grasps(
     base: trimesh.Trimesh,
     earlier: Mapping[str, trimesh.Trimesh],
     nest: Nest,
+    imprint: float = BED_RISE,
     screws: Sequence[ScrewGuess] = (),
+    beside: Mapping[str, trimesh.Trimesh] = MappingProxyType({}),
     apart: float = 0.0,
     wanted: float = 0.0,
 ) -> tuple[list[Grasp], list[Guess]]:
@@ -52,23 +59,44 @@ def part_grasps(
         base: The part that the fixture holds, in A [m].
         earlier: By name, what is there when it is put, in A [m].
         nest: Its place in the tray.
-        screws: That clamp it: it is held from the side, beside the driver, while they are driven.
+        imprint: How far the bed reaches up the base by the planner's imprint [m].
+        screws: It is held from the side, beside the driver, while they are driven: those that clamp
+            it, or go into it.
+        beside: By name, what is there then, in A [m].
         apart: Distance kept between the arms [m].
         wanted: Grip force per pad from above, as far as pads and gripper bear it [N].
     """
     assert part.X_TrayP is not None
-    there = {"the bed": surface(_bed(base, up))}
-    there |= {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
-    around = {"its nest": surface(_nest_in_part(nest, part.X_TrayP)), **there}
-    above = sample_grasps(part.mesh, part.mass, hand, up, [*around.values()], wanted=wanted)
-    why = "" if above else why_no_grasp(part.mesh, part.mass, hand, up, around)
+    rises = sorted({BED_RISE, min(BED_RISE, imprint + IMPRINT_ERROR)}, reverse=True)
+
+    def sampled(
+        around: Mapping[str, fcl.BVHModel], *, from_side: bool = False
+    ) -> list[RankedGrasp]:
+        found: list[RankedGrasp] = []
+        for rise in rises:
+            obstacles = [surface(_bed(base, up, rise)), *around.values()]
+            force = 0.0 if from_side else wanted
+            lower = sample_grasps(
+                part.mesh, part.mass, hand, up, obstacles, from_side=from_side, wanted=force
+            )
+            found = max(found, lower, key=lambda ranked: ranked[0].score if ranked else -np.inf)
+            if found and (from_side or found[0].score > POOR):
+                break
+        return found
+
+    around = {f"'{name}'": surface(mesh) for name, mesh in earlier.items()}
+    around["its nest"] = surface(_nest_in_part(nest, part.X_TrayP))
+    above = sampled(around)
+    bed = {"the bed": surface(_bed(base, up, rises[-1]))}
+    why = "" if above else why_no_grasp(part.mesh, part.mass, hand, up, {**bed, **around})
     guesses = [_guess(part.name, above, "from above", why)]
     side: list[RankedGrasp] = []
     if screws:
+        there = {f"'{name}'": surface(mesh) for name, mesh in beside.items()}
         there["the driver"] = surface(joined([_driver_over(screw, apart) for screw in screws]))
-        side = sample_grasps(part.mesh, part.mass, hand, up, [*there.values()], from_side=True)
+        side = sampled(there, from_side=True)
         # No more is said of why there is none: the fixture alone holds it then.
-        how = "from the side, while it is screwed down"
+        how = "from the side, while screws are driven"
         guesses.append(_guess(part.name, side, how, "nothing fits between what is around"))
     return [ranked.grasp for ranked in (*above, *side)], guesses
 
@@ -114,9 +142,9 @@ def _guess(part: str, found: Sequence[RankedGrasp], how: str, why: str) -> Guess
     return Guess(part, what, reason, 0.8)
 
 
-def _bed(base: trimesh.Trimesh, up: np.ndarray) -> trimesh.Trimesh:
+def _bed(base: trimesh.Trimesh, up: np.ndarray, rise: float) -> trimesh.Trimesh:
     """Return a slab whose upper face is where the bed reaches up the fixed part."""
-    top = float((base.vertices @ up).min()) + BED_RISE
+    top = float((base.vertices @ up).min()) + rise
     size = np.where(np.abs(up) > 0.5, 0.02, BED_SIDE)
     centre = base.vertices.mean(axis=0)
     centre = centre - up * (centre @ up) + up * (top - 0.01)

@@ -110,7 +110,9 @@ def guess_screws(features: Features) -> tuple[list[ScrewGuess], list[Guess]]:
                 known = f"sizes and bits are known from {SIZES[0].name} to {SIZES[-1].name}"
                 guesses.append(Guess(part, f"not taken for a screw: {known}", looks, 0.7))
             continue
-        kind, misfit = head_of(size, 2e3 * head.radius, 1e3 * head.length)
+        # A chamfer or a dome belongs to the head.
+        head_height = head.flare_high[1] - head.flare_low[1]
+        kind, misfit = head_of(size, 2e3 * head.radius, 1e3 * head_height)
         if misfit > 2.0 * HEAD_MISFIT:
             continue
         if not threaded or not passed:
@@ -127,7 +129,7 @@ def guess_screws(features: Features) -> tuple[list[ScrewGuess], list[Guess]]:
                 part=part,
                 size=size,
                 head=kind,
-                head_size=(2.0 * head.radius, head.flare_high[1] - head.flare_low[1]),
+                head_size=(2.0 * head.radius, head_height),
                 length=shank.high - shank.flare_low[1],
                 axis=shank.axis,
                 p_AoP=shank.point + under * shank.axis,
@@ -186,6 +188,12 @@ def _fit_guess(fit: FitGuess, count: int) -> Guess:
         return Guess(subject, what, f"shaft drawn wider than its hole{several}", 0.8)
     what = f"fit, {size}, clearance {1e6 * fit.clearance:.0f} um"
     return Guess(subject, what, f"coaxial shaft and hole{several}", 0.9)
+
+
+def shafts_of(part: str, features: Features) -> set[int]:
+    """Return the numbers of the bosses of a part that holes of others are around."""
+    bosses = [number for number, cylinder in enumerate(features[part]) if not cylinder.hole]
+    return {n for n in bosses if _holes_around(part, features[part][n], features)}
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ def why_no_grasp(
     up: np.ndarray,
     around: Mapping[str, fcl.BVHModel],
 ) -> str:
-    """Return in words why `sample_grasps` finds nothing from above.
+    """Return in words why `sample_grasps` finds nothing from above; "" if it finds something.
 
     Args:
         mesh: The part in A [m].
@@ -38,6 +38,8 @@ def why_no_grasp(
 
     if not has_grasp():
         return "it has no two opposite faces, upright and level, that are large enough for jaws"
+    if not around:
+        return ""
     alone = [name for name, obstacle in around.items() if not has_grasp(obstacle)]
     if alone:
         return f"{' and '.join(alone)} alone would leave the jaws no room"

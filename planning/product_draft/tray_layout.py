@@ -22,6 +22,7 @@ from cell.errors import InputError
 SIZE = (260.0, 200.0)  # [D] Of the tray [mm]: between the jig and the end of the arms' reach.
 BORDER = 6.0  # [A] Between a nest and the edge of the tray [mm].
 GAP = 40.0  # [D] Between neighbours: two fingers, opened, and their clearance [mm].
+RAIL_GAP = 10.0  # [A] Between the rails of rows side by side: heads end before them [mm].
 RAIL_DEPTH = 24.0  # [A] Of a row of screws, with fingers around them [mm].
 
 
@@ -49,12 +50,13 @@ def lay_out(parts: Mapping[str, Manifold], rows: Sequence[ScrewRow]) -> list[Nes
     edge = PLAY + STOP_THICKNESS
     sizes = {name: np.subtract(*reversed(outline(s)))[:2] + 2 * edge for name, s in parts.items()}
     front = -SIZE[1] / 2 + BORDER
-    for row in rows:
-        length = rail_length(len(row.names), row.head)
-        if length > SIZE[0] - 2 * BORDER:
-            raise _too_small(f"a row of {len(row.names)} screws is {length:.0f} mm long")
-        at = (0.0, front + RAIL_DEPTH / 2)
-        nests += rail_nest(row.names, row.diameter, row.length, row.head, at)
+    for line in _lines(rows):
+        width = sum(length for _, length in line) + RAIL_GAP * (len(line) - 1)
+        x = -width / 2
+        for row, length in line:
+            at = (x + length / 2, front + RAIL_DEPTH / 2)
+            nests += rail_nest(row.names, row.diameter, row.length, row.head, at)
+            x += length + RAIL_GAP
         front += RAIL_DEPTH
     back = SIZE[1] / 2 - BORDER
     for shelf in _shelves(sizes):
@@ -71,6 +73,22 @@ def lay_out(parts: Mapping[str, Manifold], rows: Sequence[ScrewRow]) -> list[Nes
             x += sizes[name][0] / 2
         back -= depth + GAP
     return nests
+
+
+def _lines(rows: Sequence[ScrewRow]) -> list[list[tuple[ScrewRow, float]]]:
+    """Return the rows with their lengths [mm], side by side as far as the tray's width allows."""
+    lines: list[list[tuple[ScrewRow, float]]] = []
+    free = 0.0
+    for row in rows:
+        length = rail_length(len(row.names), row.head)
+        if length > SIZE[0] - 2 * BORDER:
+            raise _too_small(f"a row of {len(row.names)} screws is {length:.0f} mm long")
+        if RAIL_GAP + length > free:
+            lines.append([])
+            free = SIZE[0] - 2 * BORDER + RAIL_GAP
+        lines[-1].append((row, length))
+        free -= RAIL_GAP + length
+    return lines
 
 
 def _shelves(sizes: Mapping[str, np.ndarray]) -> list[list[str]]:

@@ -15,6 +15,7 @@ from pydrake.math import RigidTransform
 from cell.simulation.conditions import Either, PushesBack
 from cell.simulation.phase import Phase, motion_finished
 from cell.simulation.vocabulary import in_programs
+from planning.operations.bolts import mouth_pose, standing_pose
 from planning.operations.grasping import (
     Reach,
     jaw_to_part,
@@ -175,33 +176,6 @@ def place_bolt(station: Station, bolt: str, closely: Sequence[str] = ()) -> Iter
     yield from let_go(station, bolt, reach.grasp, RETREAT, awake)
     # Who cannot see the bolt knows it by what holds it, better than by the hand that was there.
     station.belief.rest(bolt, standing_pose(station, bolt))
-
-
-def seated_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return X_WP of a bolt whose head rests on what it clamps, from what is believed.
-
-    It is derived from the part that carries the thread, once that is on the fixture.
-    """
-    screw = station.cell.product.screws[bolt]
-    name = screw.into if screw.into in station.fixed else screw.clamps
-    X_WA = station.pose_of(name) @ station.part(name).X_AP.inverse()
-    return X_WA @ station.part(bolt).X_AP
-
-
-def mouth_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return X_WP of a bolt that stands on the mouth of its thread, be it there or not."""
-    out = RigidTransform([0.0, 0.0, station.cell.product.screws[bolt].thread_depth])
-    return seated_pose(station, bolt) @ out
-
-
-def standing_pose(station: Station, bolt: str) -> RigidTransform:
-    """Return X_WP at which a bolt will stand: on its thread, or by its head where there is none.
-
-    Something else below the hole, such as the bed, may stop a bolt without a thread before.
-    """
-    if station.cell.product.screws[bolt].into in station.fixed:
-        return mouth_pose(station, bolt)
-    return seated_pose(station, bolt)
 
 
 def _grasp_for_hole(station: Station, bolt: str) -> Reach:

@@ -29,6 +29,7 @@ from planning.operations.grasping import (
 )
 from planning.operations.look import look
 from planning.operations.operation import Step
+from planning.operations.present import present
 from planning.operations.station import Station
 
 LIFT = 0.12
@@ -75,6 +76,9 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         awake=awake,
     )
     yield from lift(station, part, reach, LIFT)
+    # On what it does not lie flat or squarely in its place, it tips over or jams there.
+    forget = (release_part(part),)
+    yield from present(station, part, guard=holding, awake=awake, riding=riding, start=forget)
     above = raised(X_WGoal, ABOVE) @ jaw_to_part(station, part, reach.grasp).inverse()
     q_above = station.configuration(arm, jaw, above, reach.q_before)
     yield Phase(
@@ -84,7 +88,7 @@ def carry_out(station: Station, step: Step) -> Iterator[Phase]:
         subject=part,
         commands={arm.name: station.move(arm, q_above)},
         guard=holding,
-        start=(release_part(part),),
+        start=forget,
         awake=awake,
         riding=riding,
     )

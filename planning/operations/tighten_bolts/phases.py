@@ -1,8 +1,9 @@
 """The phases that drive standing bolts home in star order.
 
 The driver comes down on one head after another: bit into socket, thread caught, run down, seated,
-tightened until the clutch trips. The gripper holds the clamped part meanwhile, or is out of the
-way. Screws that ask for two passes are all tightened to half their torque first.
+tightened until the clutch trips. The gripper holds against it meanwhile, by the clamped part or by
+the one that the thread is in, or is out of the way. Screws that ask for two passes are all
+tightened to half their torque first.
 """
 
 from __future__ import annotations
@@ -27,12 +28,12 @@ from cell.simulation.phase import (
 )
 from cell.simulation.vocabulary import in_programs
 from planning.motion.paths import NoPath
-from planning.operations.counter_hold import Coming, from_the_side, hold, park
+from planning.operations.counter_hold import Coming, from_the_side, hold, park, parking
 from planning.operations.grasping import Reach, backed_off, let_go, opened, raised
 from planning.operations.look import look
 from planning.operations.operation import Step
 from planning.operations.station import FINE_CLEARANCE, Station
-from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed
+from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed, seat_speed
 
 BIT_HOVER = 0.012  # The bit waits this far above the socket [m] [A].
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
@@ -41,6 +42,7 @@ SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to i
 FEED_RESERVE = 0.003  # The feed can follow the bolt this far beyond its engaged length [m] [A].
 STOP_TIME = 0.05  # Of the spindle [s] [A].
 REST_TIME = 0.2  # [s] [A]
+MOST_MET = 2  # [A] Collisions that are told of.
 RETREAT = 0.05  # Of the gripper from what it held [m] [A].
 
 
@@ -144,13 +146,16 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
     def leaves_room(reach: Reach) -> bool:
         return _leaves_room(station, order, reach)
 
+    def clear_at(q: np.ndarray) -> bool:
+        return _clear_at(station, order, q)
+
     if station.config.driver.counter_hold:
-        grasp = yield from hold(station, clamped, meanwhile, leaves_room)
+        held = yield from hold(station, holdable(station, step), meanwhile, leaves_room, clear_at)
         yield from _tighten_all(station, order)
-        if grasp is not None:
-            yield from let_go(station, clamped, grasp, RETREAT, assembly)
+        if held is not None:
+            yield from let_go(station, *held, RETREAT, assembly)
     else:
-        yield from park(station, meanwhile)
+        yield from park(station, meanwhile, clear_at)
         yield from _tighten_all(station, order)
     # Nothing holds the assembly now but the fixture: what it measures here is what the user gets.
     yield Phase(DrivePhase.REST, after(REST_TIME), timeout=1.0, subject="assembly", awake=assembly)
@@ -158,18 +163,34 @@ def carry_out(station: Station, step: Step) -> Generator[Phase, Outcome, None]:
 
 def foresee(station: Station, step: Step) -> tuple[str, ...]:
     """See whether the driver reaches every bolt, beside the hand that holds against it."""
-    clamped = station.cell.product.screws[step.parts[0]].clamps
-    holds = station.config.driver.counter_hold
-    if holds and any(_leaves_room(station, step.parts, r) for r in from_the_side(station, clamped)):
+    parts, holds = holdable(station, step), station.config.driver.counter_hold
+    sides = from_the_side(station, parts) if holds else ()
+    if any(_leaves_room(station, step.parts, reach) for _, reach in sides):
         return ()
-    away = {station.holder.name: station.holder.home}
+    q_park = parking(station, lambda q: _clear_at(station, step.parts, q))
+    away = {station.holder.name: q_park}
     for bolt in step.parts:
         if not is_reached(station, bolt, away):
             _above(station, bolt, away)  # Raises what is said of it.
     if not holds:
         return ()
     alone = "leaves room for the driver: the jig alone bears the torque"
-    return (f"no grasp of '{clamped}' from the side {alone}",)
+    either = " or ".join(f"'{part}'" for part in parts)
+    return (f"no grasp of {either} from the side {alone}",)
+
+
+def holdable(station: Station, step: Step) -> tuple[str, str]:
+    """Return the parts by which the hand may hold against the driver: best the one under the heads.
+
+    The torque of a head goes into what it clamps; the part with the thread takes it from there.
+    """
+    screw = station.cell.product.screws[step.parts[0]]
+    return screw.clamps, screw.into
+
+
+def _clear_at(station: Station, bolts: Sequence[str], q: np.ndarray) -> bool:
+    """Return whether the driver reaches bolts while the holder is at joint angles (n,) [rad]."""
+    return all(is_reached(station, bolt, {station.holder.name: q}) for bolt in bolts)
 
 
 def _leaves_room(station: Station, bolts: Sequence[str], reach: Reach) -> bool:
@@ -256,9 +277,12 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
     yield Phase(
         kinds.tighten,
         Clutch(spindle, kinds.share * screw.torque),
-        timeout=5.0,
+        timeout=10.0,
         subject=bolt,
-        commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
+        commands={
+            driver.name: feed,
+            spindle: Spin(seat_speed(screw, config.driver.seat_speed)),
+        },
         awake=awake,
         mating=mating,
         fine_log=True,
@@ -313,7 +337,11 @@ def _above(
     found = list(ways_above(station, bolt, elsewhere))
     if not found:
         X_WE = backed_off(_socket_pose(station, bolt), BIT_HOVER)
-        reason = "no turn of the driver keeps clear there"
+        reason = "out of reach, however the driver is turned"
+        solutions = driver.configurations(station.context, driver.frame("tool_tip"), X_WE, near)
+        if solutions:
+            met = station.model.collisions(driver.name, solutions[0])
+            reason = f"no turn of the driver keeps clear: {'; '.join(met[:MOST_MET])}"
         raise Unreachable(driver.name, "tool_tip", X_WE, reason)
     return min(found, key=lambda q: float(np.max(np.abs(q - near))))
 
