@@ -36,6 +36,7 @@ from cell.ports import Ports, add_part_poses
 from cell.products.product import Product
 from cell.sleep import Sleep
 from cell.workpieces.parts import Parts, add_parts
+from cell.workpieces.press_fits import PressFits, add_press_fits
 from cell.workpieces.threads import Threads, add_threads
 from cell.workpieces.work import fixture_work
 
@@ -55,6 +56,7 @@ class Cell:
         fixture: Holds a part on the base.
         parts: The loose parts.
         threads: Of the product's bolts.
+        press_fits: Of the product's parts.
         links: Contacts that stick, as springs.
         sleeper: Puts parts and base to sleep.
         force_plate: Wrench sensor under the jig.
@@ -73,6 +75,7 @@ class Cell:
     fixture: Fixture
     parts: Parts
     threads: Threads
+    press_fits: PressFits
     links: ContactLinks
     sleeper: Sleep
     force_plate: WrenchSensor
@@ -188,6 +191,7 @@ def add_cell(
     parts = add_parts(plant, product, config.workcell.X_WT)
     drivers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Driver)]
     threads = add_threads(plant, scene_graph, product, parts, next(iter(drivers), None))
+    press_fits = add_press_fits(plant, product, parts)
     kind = config.workcell.fixture
     work = fixture_work(config, product)
     fixture = add_fixture(kind, plant, scene_graph, workcell.base, config.jig, work)
@@ -203,6 +207,8 @@ def add_cell(
     bearers = (workcell.base, workcell.plate)
     wiring = wire_fixture(builder, plant, scene_graph, fixture, bearers, links, prefix)
     builder.AddNamedSystem(f"{prefix}threads", threads)
+    builder.AddNamedSystem(f"{prefix}press_fits", press_fits)
+    press_fits.connect(builder, plant)
     force_plate = WrenchSensor(plant, workcell.plate_weld)
     ports = Ports()
     for arm in arms.values():
@@ -219,6 +225,7 @@ def add_cell(
 
     def reset(root: Context) -> None:
         threads.install(root)
+        press_fits.install(root)
         links.install(root)
         jig_base.reset(root)
         fixture.install(root)
@@ -233,12 +240,13 @@ def add_cell(
         fixture=fixture,
         parts=replace(parts, sleeper=wiring.sleeper),
         threads=threads,
+        press_fits=press_fits,
         links=links,
         sleeper=wiring.sleeper,
         force_plate=force_plate,
         cameras=cameras_of(plant, scene_graph, config.workcell.X_WJ, config.camera),
         ports=ports,
-        monitor=Monitor(counter, reset, (fixture, threads, links)),
+        monitor=Monitor(counter, reset, (fixture, threads, press_fits, links)),
     )
 
 

@@ -30,13 +30,14 @@ from planning.assembly_plan.planner import plan
 from planning.operations import mating as mating_phases
 from planning.operations.grasping import let_go
 from planning.operations.insert_shaft import INSERT_SHAFT
-from planning.operations.mating import Mating, goal_pose
+from planning.operations.mating import goal_pose
 from planning.operations.operation import Step, StepRecord
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.pick_place.phases import PlacePhase
 from planning.operations.sequence import steps
 from planning.operations.set_aside import SET_ASIDE
 from planning.operations.snapshot import take_snapshot
+from planning.operations.soft_hand import Mating
 from planning.operations.station import Placement, Station
 from planning.operations.tighten_bolts import TIGHTEN_BOLTS
 

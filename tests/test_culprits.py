@@ -14,8 +14,8 @@ from experiments.assembly.prepare import Disturbance, RunningCell
 from experiments.assembly.run import Run
 from planning.assembly_plan.planner import plan
 from planning.operations.grasping import raised
-from planning.operations.mating import MatePhase
 from planning.operations.sequence import steps
+from planning.operations.soft_hand import MatePhase
 from planning.operations.targets import Descent
 
 

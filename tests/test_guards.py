@@ -37,8 +37,8 @@ from experiments.assembly.prepare import RunningCell
 from planning.assembly_plan.planner import plan
 from planning.motion.timing import JointMotion
 from planning.operations.grasping import LOST, HandPhase, check_lifted
-from planning.operations.mating import SOFT, TOO_MUCH
 from planning.operations.sequence import steps
+from planning.operations.soft_hand import SOFT, TOO_MUCH
 from planning.operations.tighten_bolts.servos import Clutch
 
 ORDER = ("plate", "bolts", "motor")  # Every operation of an assembly has a step in it.

@@ -8,9 +8,9 @@ from cell.simulation.phase import Phase
 from experiments.assembly.prepare import RunningCell
 from planning.assembly_plan.planner import plan
 from planning.operations.grasping import HandPhase
-from planning.operations.mating import SOFT, MatePhase
 from planning.operations.sequence import steps
 from planning.operations.set_aside.phases import AsidePhase
+from planning.operations.soft_hand import SOFT, MatePhase
 from planning.operations.tighten_bolts.phases import DrivePhase
 
 ORDER = ("plate", "bolts", "motor")

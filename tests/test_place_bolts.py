@@ -18,13 +18,14 @@ from experiments.assembly.prepare import RunningCell
 from planning.motion.timing import JointMotion
 from planning.operations.bolts import mouth_pose, standing_pose
 from planning.operations.grasping import HandPhase
-from planning.operations.mating import Mating, mate
+from planning.operations.mating import mate
 from planning.operations.place_bolts.phases import (
     PLACES,
     BoltPhase,
     place_bolt,
 )
 from planning.operations.placement import pose_on_jig
+from planning.operations.soft_hand import Mating
 
 PRODUCT = load_product("motor_unit")
 LOWERED = (BoltPhase.LOWER, BoltPhase.LOWER_BESIDE)

@@ -21,7 +21,7 @@ from cell.simulation.phase import Phase, after
 from experiments.assembly import recording, video
 from experiments.assembly.film import SURFACE_PERIOD, Film
 from experiments.assembly.recording import POSE_PERIOD, write_recording
-from planning.operations.mating import MatePhase
+from planning.operations.soft_hand import MatePhase
 
 needs_rendering = pytest.mark.skipif(
     rendering_problem() is not None, reason=str(rendering_problem())

@@ -17,11 +17,11 @@ from cell.simulation.phase import Phase
 from experiments.assembly.prepare import RunningCell
 from experiments.assembly.run import Run
 from planning.operations.insert_shaft import INSERT_SHAFT
-from planning.operations.mating import MatePhase
 from planning.operations.operation import Step
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.pick_place.phases import PlacePhase
 from planning.operations.pick_place.recovery import MOST_AGAIN
+from planning.operations.soft_hand import MatePhase
 from planning.perception.belief import Estimate, Source
 
 PRODUCT = load_product("motor_unit")

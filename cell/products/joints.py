@@ -74,7 +74,7 @@ class Press:
 
     Attributes:
         shaft, hole, p_AoF, depth: As for a `Fit`.
-        force: Force that seats it [N].
+        force: Friction of the seated fit along its axis [N]; on the way it grows with the depth.
     """
 
     keys: ClassVar[tuple[str, ...]] = (*Fit.keys, "force_N")

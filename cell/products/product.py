@@ -5,13 +5,15 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
+import numpy as np
 import trimesh
 from pydrake.math import RigidTransform
 
 from cell.errors import BadPart, InputError, UnknownName
 from cell.products.declared import Declared
-from cell.products.joints import Fit, Joint, Screw
+from cell.products.joints import Fit, Joint, Press, Screw
 from cell.products.mesh_io import LARGEST_PART
+from cell.vectors import rotation_with_up
 
 
 @dataclass(frozen=True)
@@ -117,6 +119,22 @@ class Product:
     def fits(self) -> tuple[Fit, ...]:
         """The joints that are fits of a shaft in a hole."""
         return tuple(joint for joint in self.joints if isinstance(joint, Fit))
+
+    @property
+    def presses(self) -> tuple[Press, ...]:
+        """The joints that are press fits."""
+        return tuple(joint for joint in self.joints if isinstance(joint, Press))
+
+    @property
+    def up_axis(self) -> np.ndarray:
+        """Unit vector (3,) in A that points up on the jig."""
+        return rotation_with_up(self.up).inverse() @ np.array([0.0, 0.0, 1.0])
+
+    def enters_from_above(self, joint: Fit | Press) -> bool:
+        """Return whether a shaft comes down into its hole: what has the hole is below its mouth."""
+        hole = self.parts[joint.hole]
+        p_AoG = hole.X_AP @ np.asarray(hole.mesh.center_mass, float)
+        return bool(self.up_axis @ (p_AoG - joint.p_AoF) < 0.0)
 
     @property
     def screws(self) -> Mapping[str, Screw]:

@@ -44,6 +44,7 @@ def save_state(simulation: Simulation) -> State:
         "asleep": asleep | {"jig_base": np.array(cell.jig_base.asleep(root))},
         "sleep": cell.sleeper.save(root, [*bodies, *free, cell.jig_base.body]),
         "threads": cell.threads.save(root),
+        "press_fits": cell.press_fits.save(root),
         "fixture": cell.fixture.save(root),
         "links": cell.links.save(root),
     }
@@ -92,6 +93,7 @@ def _restore(simulation: Simulation, state: dict[str, Any]) -> None:
     cell.jig_base.wake(root)
     cell.sleeper.wake_all(root)
     cell.threads.restore(root, state["threads"])
+    cell.press_fits.restore(root, state.get("press_fits", {}))  # Of none nothing is saved.
     cell.fixture.restore(root, state.get("fixture", {}))
     for part in cell.parts:
         if state["asleep"][part.part.name]:

@@ -18,6 +18,7 @@ from planning.product_check.check import (
     fixture_findings,
     machine_findings,
     plan_findings,
+    press_findings,
     simulated_findings,
 )
 from planning.product_check.finding import Finding, Level
@@ -59,7 +60,7 @@ def find(
     planned, todo = plan_findings(product, fixing)
     choices = fixture_choices(product, fixing, config)
     held = bed_findings(product, fixing, config)
-    found += [*held, *fixture_findings(fixing, choices), *planned]
+    found += [*held, *fixture_findings(fixing, choices), *press_findings(fixing, choices), *planned]
     running = RunningCell(product, with_fixture_for(config, product, seed, todo), seed)
     borne = borne_torques(fixing, choices)
     return [*found, *simulated_findings(running.simulation, running.station, todo, borne)]

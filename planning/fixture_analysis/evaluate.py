@@ -251,6 +251,11 @@ class Evaluation:
         """Return how often the body, held by a fixture, bears the loads by the map."""
         p_JMiddle = held.p_JA + [*self.p_middle, self.low]
         margin = margin_by_map(held, p_JMiddle, self._loads())
+        if margin.load.pressed:
+            self.figures |= {
+                "bears_down_N": margin.across * margin.load.down,
+                "pressed_down_N": margin.load.down,
+            }
         self.shared.judged[self.proposal.key] = Judged(held, margin.cases)
         return margin
 

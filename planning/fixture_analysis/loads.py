@@ -29,6 +29,7 @@ class OperationLoad:
         p_Q: (2,) point of application, in the imprint's plane [m].
         height: Of that point above the body's lowest point [m].
         directions: Directions that the sideways force may have, (2,) each.
+        pressed: Share of ``down`` that presses a shaft into a hole that is narrower [N].
     """
 
     down: float
@@ -37,6 +38,7 @@ class OperationLoad:
     p_Q: np.ndarray
     height: float
     directions: tuple[np.ndarray, ...] = PUSH_DIRECTIONS
+    pressed: float = 0.0
 
 
 def operation_load(
@@ -51,7 +53,7 @@ def operation_load(
     """Return the load on the body while one piece is brought to it.
 
     Args:
-        product: For its fits and screws.
+        product: For its fits, press fits and screws.
         solids: Parts by name.
         setup: Forces of the operations.
         proposal: What is on the jig, and in which posture.
@@ -75,7 +77,17 @@ def operation_load(
         down = force * max(0.0, float(way[2]))
         return OperationLoad(down, sideways, torque, p_Q, height, (push,))
     if proposal.approach == "above":
-        return OperationLoad(force, FIT_FRICTION * force, torque, p_Q, height)
+        pressed = max(
+            (
+                joint.force
+                for joint in product.presses
+                if set(joint.parts) & set(piece) and set(joint.parts) & set(proposal.body)
+            ),
+            default=0.0,
+        )
+        return OperationLoad(
+            force + pressed, FIT_FRICTION * force, torque, p_Q, height, pressed=pressed
+        )
     along = [-(R_JA @ unit_vector(j))[:2] for j in proposal.sideways]
     pushes = tuple(p for p in PUSH_DIRECTIONS if any(p @ a > 0.5 for a in along))
     return OperationLoad(0.0, force, torque, p_Q, height, pushes)
@@ -88,7 +100,7 @@ def mating_point(
 
     Otherwise the middle of the piece, at the lower of the heights of their tops.
     """
-    for fit in product.fits:
+    for fit in (*product.fits, *product.presses):
         sides = {fit.shaft, fit.hole}
         if sides & set(piece) and sides & set(proposal.body):
             return np.asarray(fit.p_AoF, float)

@@ -1,25 +1,20 @@
 """The phases that bring a part from above to one on the fixture, until it is seated.
 
-The hand carries the part over its place, then goes soft: an impedance centred where the parts meet
-lets it comply sideways and tilt, pushes with a limited force, and searches on a spiral if a shaft
-has not found its hole. It ends when the part stands still; whether it is seated is measured, not
-assumed.
+The hand carries the part over its place, then goes soft, see `planning.operations.soft_hand`, and
+lets go of it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass
-from enum import Enum
 
 import numpy as np
 from pydrake.math import RigidTransform
-from pydrake.multibody.tree import Frame
 
-from cell.configuration.config import InsertionConfig
-from cell.simulation.conditions import All, Below, FirstOf, Height, Steady, TooMuchForce
-from cell.simulation.phase import Condition, Impedance, Outcome, Phase, after, motion_finished
-from cell.simulation.vocabulary import in_programs
+from cell.products.joints import Fit, Press
+from cell.products.product import Grasp, Product
+from cell.simulation.phase import Phase, motion_finished
+from planning.feasibility.directions import unit_vector
 from planning.operations.bolts import standing_pose
 from planning.operations.grasping import (
     Reach,
@@ -34,72 +29,47 @@ from planning.operations.grasping import (
     take,
 )
 from planning.operations.look import look
+from planning.operations.soft_hand import NEAR, MatePhase, Mating, SoftHand, insert
 from planning.operations.station import FINE_CLEARANCE, Station
-from planning.operations.targets import Descent, Spiral, There
 from planning.operations.waiting import steady_wrist
 
 LIFT = 0.12
 ABOVE = 0.045  # Transfers end this far above the seat, clear of the shaft [m] [A].
-NEAR = 0.002  # The hand goes soft this far before shaft and hole can meet [m] [A].
-LANDING = 0.001  # Slow from this far above the seat to this far below it [m] [A].
-BEYOND = 0.004  # The soft target ends this far below the seat, so that the hand presses [m] [A].
 RETREAT = 0.08
-STALL_TIME = 0.25
-STALLED = 1.25e-4  # What moves less than this in the stall time stands: 0.5 mm/s [m].
-PATIENCE = 5.0  # For coming to a stand under the whole force [s] [A].
-YAW_STIFFNESS = 40.0  # About the axis of the hole; the bolt holes must meet [N m/rad] [A].
-LATERAL_LIMIT = 15.0  # [N] [A]
-TORQUE_LIMIT = 1.0  # [N m] [A]
-TOO_MUCH = 30.0  # Insertion fails above this force [N].
 
-Target = Callable[[float], RigidTransform]  # X_WD of the compliance centre over time [s].
+Suits = Callable[[Grasp], bool]  # Whether a grasp bears what comes.
 
 
-@dataclass(frozen=True)
-class Mating:
-    """What is brought to what.
+def mating_at_hole(product: Product, joint: Fit | Press, part: str) -> Mating:
+    """Return what it takes to bring one part of a shaft in its hole to the other.
 
-    Attributes:
-        part: Name of the part in the hand.
-        on: Name of the part on the fixture.
-        p_AoC: Compliance centre C, in the product frame A [m]: the mouth of the hole in the hand,
-            the tip of the shaft in the hand, or the middle of the face that comes to rest.
-        depth: How far before its seat it meets what guides it, as a shaft its hole [m]; 0: nothing
-            does.
-        axis: (3,) direction out of the seat, in A.
+    The compliance centre is where the part in the hand meets the other one first: at the mouth of
+    its hole, or at the tip of its shaft.
     """
-
-    part: str
-    on: str
-    p_AoC: np.ndarray
-    depth: float
-    axis: np.ndarray
+    up = unit_vector(product.up)
+    if part == joint.hole:
+        return Mating(joint.hole, joint.shaft, joint.p_AoF, joint.depth, up)
+    return Mating(joint.shaft, joint.hole, joint.p_AoF - joint.depth * up, joint.depth, up)
 
 
-@in_programs
-class MatePhase(Enum):
-    """What comes besides taking the part and letting it go."""
-
-    LOOK = "look"
-    TRANSFER = "transfer"
-    LOOK_OVER_SHAFT = "look over the shaft"
-    ALIGN = "align"
-    HOVER = "hover"
-    INSERT = "insert"
-    SEARCH = "search"
-    INSERT_AGAIN = "insert again"
-    PRESS = "press"
-
-
-# Those in which the hand is soft, in their order.
-SOFT = (MatePhase.INSERT, MatePhase.SEARCH, MatePhase.INSERT_AGAIN, MatePhase.PRESS)
-
-
-def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iterator[Phase]:
+def mate(
+    station: Station,
+    mating: Mating,
+    riders: tuple[str, ...] = (),
+    soft: Callable[[SoftHand], Iterator[Phase]] = insert,
+    suits: Suits | None = None,
+) -> Iterator[Phase]:
     """Yield the phases that bring a part to its seat and let it go.
 
     Bolts that ride in its holes reach beyond its underside: they come to stand on the mouths of
     their threads, and their heads stay behind as the part sinks to its seat.
+
+    Args:
+        station: The planner's view of the cell.
+        mating: What is brought to what.
+        riders: Names of the parts that lie loose on it.
+        soft: Yields the phases in which the hand is soft.
+        suits: See `useful_grasp`.
     """
     arm, part = station.holder, mating.part
     riding = frozenset(riders)
@@ -108,7 +78,7 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
     both = held | {mating.on, *station.fixed}
     yield from look(station, MatePhase.LOOK, part, closely=(part, mating.on))
     X_WGoal = goal_pose(station, mating)
-    reach = useful_grasp(station, mating, X_WGoal)
+    reach = useful_grasp(station, mating, X_WGoal, suits)
     yield from take(station, part, reach, LIFT, riders)
     jaw, holding = arm.frame(reach.grasp.jaw), lost_grasp(station)
     above = raised(X_WGoal, ABOVE) @ jaw_to_part(station, part, reach.grasp).inverse()
@@ -156,7 +126,7 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
         awake=held,
         riding=riding,
     )
-    yield from _insert(station, mating, X_WGoal, jaw, X_JawP, both)
+    yield from soft(SoftHand(station, mating, X_WGoal, reach.grasp, X_JawP, both))
     yield from let_go(station, part, reach.grasp, RETREAT, both)
     # Who cannot see a bolt knows it by what it has come to stand on, not by the hand it rode in.
     for bolt in riders:
@@ -164,14 +134,14 @@ def mate(station: Station, mating: Mating, riders: tuple[str, ...] = ()) -> Iter
             station.belief.rest(bolt, standing_pose(station, bolt))
 
 
-def foresee_mating(station: Station, mating: Mating) -> None:
+def foresee_mating(station: Station, mating: Mating, suits: Suits | None = None) -> None:
     """Choose a grasp that fits where a part is taken and where it is put; believe it to be there.
 
     Raises:
         Unreachable: There is none.
     """
     X_WGoal = goal_pose(station, mating)
-    useful_grasp(station, mating, X_WGoal)
+    useful_grasp(station, mating, X_WGoal, suits)
     station.belief.suppose(mating.part, X_WGoal)
 
 
@@ -181,14 +151,17 @@ def goal_pose(station: Station, mating: Mating) -> RigidTransform:
     return station.pose_of(mating.on) @ on.X_AP.inverse() @ part.X_AP
 
 
-def useful_grasp(station: Station, mating: Mating, X_WGoal: RigidTransform) -> Reach:
-    """Return the first of the `useful_grasps`.
+def useful_grasp(
+    station: Station, mating: Mating, X_WGoal: RigidTransform, suits: Suits | None = None
+) -> Reach:
+    """Return the first of the `useful_grasps` that suits; None: any does.
 
     Raises:
         Unreachable: There is none; it says at which end.
     """
     for reach in useful_grasps(station, mating, X_WGoal):
-        return reach
+        if suits is None or suits(reach.grasp):
+            return reach
     part = station.part(mating.part)
     X_WP = station.pose_of(part.name)
     above = [g for g in part.grasps if comes_from_above(X_WGoal, g.X_PJaw)]
@@ -218,103 +191,3 @@ def useful_grasps(station: Station, mating: Mating, X_WGoal: RigidTransform) -> 
             )
         ):
             yield reach
-
-
-def _insert(
-    station: Station,
-    mating: Mating,
-    X_WGoal: RigidTransform,
-    jaw: Frame,
-    X_JawP: RigidTransform,
-    awake: frozenset[str],
-) -> Iterator[Phase]:
-    """Yield the soft phases: insert, search if it did not go in, press."""
-    config = station.config.insertion
-    # C: the compliance centre, with the axes of the part.
-    X_PC = RigidTransform(station.part(mating.part).X_AP.inverse() @ mating.p_AoC)
-    X_JawC, X_WSeat = X_JawP @ X_PC, X_WGoal @ X_PC
-    arm = station.holder.name
-    guard = FirstOf((lost_grasp(station), TooMuchForce(arm, TOO_MUCH, "insertion force")))
-    # It slides on whatever it touches there, not only on what it comes to.
-    others = {mating.on, *station.fixed} - {mating.part}
-    pairs = frozenset(frozenset([mating.part, other]) for other in others)
-
-    def soft(
-        kind: MatePhase, force: float, target: Target, until: Condition, timeout: float
-    ) -> Phase:
-        return Phase(
-            kind,
-            until,
-            timeout=timeout,
-            subject=mating.part,
-            commands={arm: impedance(config, jaw, X_JawC, target, force)},
-            guard=guard,
-            awake=awake,
-            mating=pairs,
-            fine_log=True,
-            tare=kind is MatePhase.INSERT,
-        )
-
-    height = Height(jaw, X_JawC)
-
-    def gap(outcome: Outcome) -> float:
-        return float(height(outcome.sensed)[0] - X_WSeat.translation()[2])
-
-    start = mating.depth + NEAR
-    descending = descent(X_WSeat, start, config, height)
-    outcome = yield soft(MatePhase.INSERT, config.force_limit, *descending)
-    if mating.depth > 0.0 and gap(outcome) > mating.depth / 2:
-        mouth = gap(outcome)
-        pitch, speed = config.search_pitch, config.search_speed
-        search = Spiral(raised(X_WSeat, mouth - BEYOND), pitch, speed)
-        around = 1e3 * config.search_radius
-        stuck = f"{mating.part} does not slide onto {mating.on}, tried up to {around:g} mm aside"
-        found = Below(height, float(X_WSeat.translation()[2]) + mouth - 1e-3, stuck)
-        length = config.search_radius**2 * np.pi / config.search_pitch
-        yield soft(
-            MatePhase.SEARCH, config.search_force, search, found, length / config.search_speed
-        )
-        again = descent(X_WSeat, mouth - 1e-3, config, height)
-        outcome = yield soft(MatePhase.INSERT_AGAIN, config.force_limit, *again)
-    # Where the part has found its place: a spring that still pulls sideways would wedge it there.
-    X_WC = RigidTransform(X_WSeat.rotation(), (outcome.sensed.X_WF(jaw) @ X_JawC).translation())
-    yield soft(MatePhase.PRESS, config.force_limit, *pressing(X_WC, height))
-
-
-def impedance(
-    config: InsertionConfig, jaw: Frame, X_JawC: RigidTransform, target: Target, force: float
-) -> Impedance:
-    """Return the impedance about the hole, with a limited downward force."""
-    turn, side = config.rotational_stiffness, config.lateral_stiffness
-    return Impedance(
-        jaw,
-        X_JawC,
-        target,
-        stiffness=np.array([turn, turn, YAW_STIFFNESS, side, side, side]),
-        limit=np.array([TORQUE_LIMIT] * 3 + [LATERAL_LIMIT, LATERAL_LIMIT, force]),
-    )
-
-
-def descent(
-    X_WSeat: RigidTransform,
-    start: float,
-    config: InsertionConfig,
-    height: Height,
-) -> tuple[Target, Condition, float]:
-    """Return target, end condition and time-out of a descent from ``start`` above the seat [m].
-
-    The target slows down around the seat, where metal meets metal, and then builds up the force.
-    Only what stands still under the whole force has come to its end: a part that leans on an edge
-    stands still before.
-    """
-    heights = [start, LANDING, -LANDING, -BEYOND]
-    speeds = [config.speed, config.landing_speed, config.speed]
-    times = np.cumsum([0.0, *(-np.diff(heights) / speeds)])
-    stands = All((Steady(height, STALLED, STALL_TIME), after(float(times[-1]) + STALL_TIME)))
-    target = Descent(X_WSeat, times, np.array(heights))
-    return target, stands, float(times[-1]) + PATIENCE
-
-
-def pressing(X_WC: RigidTransform, height: Height) -> tuple[Target, Condition, float]:
-    """Return target, end condition and time-out of a push straight down from where the part is."""
-    return There(raised(X_WC, -BEYOND)), Steady(height, STALLED, STALL_TIME), PATIENCE

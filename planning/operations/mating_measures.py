@@ -10,10 +10,10 @@ from cell.products.product import Product
 from planning.operations.bolts import play_share, standing
 from planning.operations.grasping import HandPhase
 from planning.operations.log_rows import logged_poses, rows_of
-from planning.operations.mating import SOFT, MatePhase, Mating
 from planning.operations.measures import base_moved, named_of
 from planning.operations.operation import Arrays, Measured, StepRecord
 from planning.operations.snapshot import Snapshot
+from planning.operations.soft_hand import SOFT, MatePhase, Mating
 
 
 def measure_mating(cell: Cell, record: StepRecord, mating: Mating) -> Measured:

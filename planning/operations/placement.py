@@ -14,10 +14,9 @@ from pydrake.math import RigidTransform, RotationMatrix
 from cell.builder import Cell
 from cell.fixtures.base import FixtureError
 from cell.machines.arm import Unreachable
-from cell.products.joints import Fit, Rest
+from cell.products.joints import Fit, Press, Rest
 from cell.products.product import Product
 from cell.vectors import rotation_with_up
-from planning.feasibility.directions import unit_vector
 from planning.motion.paths import NoPath, plan_line
 from planning.operations.grasping import Reach, backed_off, raised
 from planning.operations.station import FIXTURE, Placement, Station
@@ -37,23 +36,16 @@ def anywhere(X_WP: RigidTransform) -> bool:
     return True
 
 
-def enters_from_above(product: Product, fit: Fit) -> bool:
-    """Return whether a shaft comes down into its hole: what has the hole is below its mouth."""
-    up, hole = unit_vector(product.up), product.parts[fit.hole]
-    p_AoG = hole.X_AP @ np.asarray(hole.mesh.center_mass, float)
-    return bool(up @ (p_AoG - fit.p_AoF) < 0.0)
-
-
 def brought_to(product: Product, part: str) -> tuple[str, ...]:
     """Return the names of the parts that come to a part from above, but for bolts."""
     found = []
     for joint in product.joints:
         if isinstance(joint, Rest) and joint.on == part:
             found.append(joint.part)
-        elif isinstance(joint, Fit):
-            if joint.shaft == part and not enters_from_above(product, joint):
+        elif isinstance(joint, Fit | Press):
+            if joint.shaft == part and not product.enters_from_above(joint):
                 found.append(joint.hole)
-            elif joint.hole == part and enters_from_above(product, joint):
+            elif joint.hole == part and product.enters_from_above(joint):
                 found.append(joint.shaft)
     return tuple(found)
 

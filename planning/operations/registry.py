@@ -7,6 +7,7 @@ from planning.operations.insert_shaft import INSERT_SHAFT
 from planning.operations.operation import Operation
 from planning.operations.pick_place import PICK_PLACE
 from planning.operations.place_bolts import PLACE_BOLTS, PLACE_LOOSE_BOLTS
+from planning.operations.press import PRESS
 from planning.operations.push import PUSH
 from planning.operations.rest import REST
 from planning.operations.set_aside import SET_ASIDE
@@ -21,6 +22,7 @@ OPERATIONS: dict[str, Operation] = {
         PLACE_BOLTS,
         PLACE_LOOSE_BOLTS,
         INSERT_SHAFT,
+        PRESS,
         REST,
         TIGHTEN_BOLTS,
         PUSH,

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from cell.products.joints import Press
 from cell.products.product import Product
 from planning.assembly_plan.planner import FixingPlan
 from planning.feasibility.algorithm import FixingStep
@@ -81,24 +80,11 @@ class _Sequence:
             return
         for part in parts:
             if not self._take(Role.BRING, (part,), riders):
-                self._refuse_press(part)
                 kinds = {o.joint.__name__.lower(): o.name for o in OPERATIONS.values() if o.joint}
                 known = ", ".join(f"{joint} by {name}" for joint, name in kinds.items())
                 raise NoOperation(
                     f"No operation brings '{part}' to {', '.join(self.scene.standing)}: the "
                     f"product has no joint between them that an operation makes ({known})."
-                )
-
-    def _refuse_press(self, part: str) -> None:
-        """Raise `NoOperation` for a part that is pressed in: no operation is meant for that."""
-        presses = [joint for joint in self.scene.product.joints if isinstance(joint, Press)]
-        for joint in presses:
-            others = set(joint.parts) - {part}
-            if part in joint.parts and others <= {*self.scene.standing}:
-                force = float(f"{joint.force:.2g}")
-                raise NoOperation(
-                    f"No operation brings '{part}' to {', '.join(others)}: it is pressed in with "
-                    f"{force:g} N, and the hand can push no harder than its grip holds."
                 )
 
     def _take(self, role: Role, parts: tuple[str, ...] = (), riders: tuple[str, ...] = ()) -> bool:

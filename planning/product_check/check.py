@@ -85,6 +85,16 @@ def borne_torques(fixing: FixingPlan, choices: Sequence[Choice]) -> dict[str, fl
     return borne
 
 
+def press_findings(fixing: FixingPlan, choices: Sequence[Choice]) -> Iterator[Finding]:
+    """Yield a finding per part that is pressed in: whether what is on the fixture bears that."""
+    for choice, step in zip(choices, fixing.steps, strict=bool(choices)):
+        figures = choice.candidates[choice.paper].figures
+        if "bears_down_N" in figures:
+            down, bears = figures["pressed_down_N"], figures["bears_down_N"]
+            text = f"pressed down with {down:.0f} N, of {bears:.0f} N that the fixture bears"
+            yield (good if down <= bears else fails)(step.fixed_part, text)
+
+
 def reach_findings(
     station: Station, todo: Sequence[Step], borne: Mapping[str, float] | None = None
 ) -> Iterator[Finding]:
@@ -102,7 +112,7 @@ def reach_findings(
     for step in todo:
         try:
             remarks = step.operation.foresee(station, step)
-        except (Unreachable, NoPath) as error:
+        except (Unreachable, NoPath, NoOperation) as error:
             yield fails(step.name, str(error))
             return  # What comes later depends on it.
         station.fixed = step.fixed_after(station.cell.product, station.fixed)
@@ -138,5 +148,6 @@ __all__ = [
     "fixture_findings",
     "machine_findings",
     "plan_findings",
+    "press_findings",
     "simulated_findings",
 ]

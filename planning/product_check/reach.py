@@ -12,7 +12,7 @@ from dataclasses import replace
 from cell.machines.arm import Unreachable
 from cell.products.product import Grasp, Product
 from planning.motion.paths import NoPath
-from planning.operations.operation import Role, Step
+from planning.operations.operation import NoOperation, Role, Step
 from planning.operations.station import Station
 
 
@@ -35,7 +35,7 @@ def reached_grasps(station: Station, todo: Sequence[Step]) -> dict[str, tuple[Gr
             reached[name] = (*reached.get(name, ()), *found)
         try:
             step.operation.foresee(station, step)
-        except (Unreachable, NoPath):
+        except (Unreachable, NoPath, NoOperation):
             return reached
         station.fixed = step.fixed_after(station.cell.product, station.fixed)
     return reached
@@ -63,5 +63,5 @@ def _does(
     trial.origins = dict(station.origins)
     try:
         return not step.operation.foresee(trial, step)
-    except (Unreachable, NoPath):
+    except (Unreachable, NoPath, NoOperation):
         return False

@@ -12,6 +12,8 @@ from planning.product_draft.joint_guesses import LINE_TO_LINE, SLIDING, shafts_o
 from planning.product_draft.recognised import Recognised
 
 GOOD_SHARE, GOOD_SURFACE = 0.02, 0.3  # [A] Errors of volume, and of the surface [mm].
+# [A] Radially, of a press fit: no wall holds its shaft, see `cell.workpieces.press_fit` [m].
+PRESS_PLAY = 5e-5
 LOOSE = 0.1  # [A] Radial clearance of what merely passes a hole, of its radius.
 
 
@@ -53,6 +55,8 @@ def _uses(seen: Recognised) -> dict[str, dict[int, Use]]:
         )
     for fit in seen.fits:
         widened = SLIDING if abs(fit.clearance) < LINE_TO_LINE else 0.0
+        if fit.clearance < -LINE_TO_LINE:
+            widened = PRESS_PLAY - fit.clearance
         uses[fit.hole][fit.hole_number] = Use("fit", fit.clearance + widened, widened=widened)
     solids = {name: to_manifold(mesh) for name, mesh in seen.meshes.items()}
     for name, own in uses.items():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -11,6 +11,8 @@ from cell.cad.round_features import cylinders_of
 from cell.configuration.config import CellConfig
 from cell.errors import InputError, RunFailure
 from cell.machines.grippers import GRIPPER_MODELS
+from cell.machines.grippers.pads import grip_for
+from cell.products.joints import Joint, Press
 from cell.products.materials import (
     DEFAULT_MATERIAL,
     DENSITIES,
@@ -101,6 +103,9 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
     modelled = write_parts(grouped, seen, contacts, folder)
     nests = write_tray(grouped, seen, folder)
     waiting = {name: replace(part, X_TrayP=nests[name][0]) for name, part in modelled.items()}
+    joining = Joining(seen, fixing, product.up, contacts, options.strength, options.torque)
+    joints = tuple(joining.joints())
+    pushed = _grip_forces(joints, place, options.config)
     gripped = {}
     hand = _hand(options.config)
     imprint = bed_reach(meshes[base], product.up, FixtureSetup.of(options.config))
@@ -121,11 +126,10 @@ def draft_product(product: Product, folder: Path, options: DraftOptions) -> Draf
             screws=own,
             beside={other: meshes[other] for other in sorted(there - set(seen.screw_named))},
             apart=options.config.motion.arm_clearance,
+            wanted=pushed.get(name, 0.0),
         )
         guesses += more
         gripped[name] = replace(part, grasps=tuple(grasps))
-    joining = Joining(seen, fixing, product.up, contacts, options.strength, options.torque)
-    joints = tuple(joining.joints())
     drafted = replace(
         grouped,
         parts=gripped,
@@ -205,6 +209,17 @@ def _planned(
         f"{hints}Every order of '{product.name}' fixes more than one part, the best {names}: "
         "contact models are made for one. --order A,B,C asks for another order."
     )
+
+
+def _grip_forces(
+    joints: Sequence[Joint], place: Mapping[str, int], config: CellConfig
+) -> dict[str, float]:
+    """Return the grip force per pad that parts want which are pressed in, by their names [N]."""
+    presses = [joint for joint in joints if isinstance(joint, Press)]
+    brought = [max(joint.parts, key=lambda name: place[name]) for joint in presses]
+    # Until the seat is felt: see `planning.operations.press`.
+    forces = [grip_for(joint.force + config.insertion.force_limit) for joint in presses]
+    return dict(zip(brought, forces, strict=True))
 
 
 def _hand(config: CellConfig) -> HandShape:

@@ -72,6 +72,7 @@ def sample_grasps(
     around: Sequence[fcl.BVHModel],
     *,
     from_side: bool = False,
+    wanted: float = 0.0,
 ) -> list[RankedGrasp]:
     """Return grasps of a part, best first.
 
@@ -82,6 +83,7 @@ def sample_grasps(
         up: (3,) direction that points up on the jig and in the tray.
         around: Surfaces that the hand keeps clear of, where the part is taken or put.
         from_side: Whether the hand comes from the side, and not from above.
+        wanted: Grip force per pad, as far as the pads and the gripper bear it [N].
     """
     own = surface(mesh)
     # Held where it is assembled, jaws may close on what is flush with it, too: that holds as well.
@@ -91,7 +93,7 @@ def sample_grasps(
         for R in _orientations(mesh, up, from_side):
             maps = DepthMaps.of(mesh, R)
             places, kept = list(_places(mesh, hand, maps, R, step)), 0
-            for ranked in _best_first(places, mass, hand, maps, R):
+            for ranked in _best_first(places, mass, hand, maps, R, wanted):
                 if from_side and ranked.area < HOLD_AREA:
                     continue
                 if kept == 2:
@@ -153,7 +155,12 @@ class _Place:
 
 
 def _best_first(
-    places: Sequence[_Place], mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+    places: Sequence[_Place],
+    mass: float,
+    hand: HandShape,
+    maps: DepthMaps,
+    R: np.ndarray,
+    wanted: float,
 ) -> Iterator[RankedGrasp]:
     """Yield the grasps with jaws along R that hold a part, whatever else is around, best first.
 
@@ -167,7 +174,7 @@ def _best_first(
         if is_found:
             yield found.pop(number)
             continue
-        ranked = _grasp_at(places[number], mass, hand, maps, R)
+        ranked = _grasp_at(places[number], mass, hand, maps, R, wanted)
         if ranked is not None:
             found[number] = ranked
             heappush(queue, (-ranked.score, True, number))
@@ -206,7 +213,7 @@ def _undersides(mesh: trimesh.Trimesh, approach: np.ndarray) -> np.ndarray:
 
 
 def _grasp_at(
-    place: _Place, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray
+    place: _Place, mass: float, hand: HandShape, maps: DepthMaps, R: np.ndarray, wanted: float
 ) -> RankedGrasp | None:
     """Return the grasp at a place, if it holds a part of a mass [kg]."""
     face, (least, most) = hand.faces[place.jaw], hand.widths(place.jaw)
@@ -220,7 +227,8 @@ def _grasp_at(
         or not grip.force_closed(PAD_FRICTION)
     ):
         return None
-    force = _force(mass, place.lever, grip.spread, SQUEEZED * hand.stiffness(place.jaw) * grip.area)
+    most = SQUEEZED * hand.stiffness(place.jaw) * grip.area
+    force = _force(mass, place.lever, grip.spread, most, wanted)
     if force is None:
         return None
     p_PJaw = R @ [grip.middle, y - face.middle[0], z - face.middle[1]]
@@ -236,7 +244,7 @@ def _steps(grid: np.ndarray, middle: float, half: float, step: float) -> np.ndar
     return middle + step * steps[np.argsort(np.abs(steps), kind="stable")]
 
 
-def _force(mass: float, lever: float, spread: float, most: float) -> float | None:
+def _force(mass: float, lever: float, spread: float, most: float, wanted: float) -> float | None:
     """Return the grip force per pad: it bears the weight, and its moment about the pads [N].
 
     None if that takes more than the gripper gives, or than the pads bear.
@@ -246,13 +254,15 @@ def _force(mass: float, lever: float, spread: float, most: float) -> float | Non
         lever: Distance of the mass centre from the line between the pads [m].
         spread: Mean distance of what touches from its middle [m].
         most: That squeezes the pads as far as they may be [N].
+        wanted: As far as there is that much [N].
     """
     weight = mass * GRAVITY
     bears = weight / (2.0 * PAD_FRICTION)
     turns = weight * lever / (2.0 * PAD_FRICTION * max(spread, 5e-4))
     needed = max(LIFT_FACTOR * bears, 2.0 * turns, LEAST_FORCE)
     usual = min(USUAL_FORCE if mass > LIGHT else LEAST_FORCE, USUAL_SHARE * most)
-    return None if needed > min(most, LARGEST_FORCE) else float(np.ceil(max(needed, usual)))
+    most = min(most, LARGEST_FORCE)
+    return None if needed > most else float(np.ceil(max(needed, usual, min(wanted, most))))
 
 
 def _is_near(ranked: RankedGrasp, found: Sequence[RankedGrasp]) -> bool:

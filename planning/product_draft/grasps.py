@@ -48,6 +48,7 @@ def part_grasps(
     screws: Sequence[ScrewGuess] = (),
     beside: Mapping[str, trimesh.Trimesh] = MappingProxyType({}),
     apart: float = 0.0,
+    wanted: float = 0.0,
 ) -> tuple[list[Grasp], list[Guess]]:
     """Return the grasps of a part, from above and, if it is held while screwed, from the side.
 
@@ -63,6 +64,7 @@ def part_grasps(
             it, or go into it.
         beside: By name, what is there then, in A [m].
         apart: Distance kept between the arms [m].
+        wanted: Grip force per pad from above, as far as pads and gripper bear it [N].
     """
     assert part.X_TrayP is not None
     rises = sorted({BED_RISE, min(BED_RISE, imprint + IMPRINT_ERROR)}, reverse=True)
@@ -73,7 +75,10 @@ def part_grasps(
         found: list[RankedGrasp] = []
         for rise in rises:
             obstacles = [surface(_bed(base, up, rise)), *around.values()]
-            lower = sample_grasps(part.mesh, part.mass, hand, up, obstacles, from_side=from_side)
+            force = 0.0 if from_side else wanted
+            lower = sample_grasps(
+                part.mesh, part.mass, hand, up, obstacles, from_side=from_side, wanted=force
+            )
             found = max(found, lower, key=lambda ranked: ranked[0].score if ranked else -np.inf)
             if found and (from_side or found[0].score > POOR):
                 break

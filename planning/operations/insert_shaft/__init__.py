@@ -6,7 +6,6 @@ from planning.operations.insert_shaft.measures import measure
 from planning.operations.insert_shaft.phases import carry_out, foresee
 from planning.operations.insert_shaft.plots import plots
 from planning.operations.operation import Operation, Role, Scene, Step
-from planning.operations.placement import enters_from_above
 
 
 def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step | None:
@@ -17,7 +16,7 @@ def plan(scene: Scene, parts: tuple[str, ...], riders: tuple[str, ...]) -> Step 
         if (
             parts == (fit.shaft,)
             and fit.hole in scene.standing
-            and enters_from_above(scene.product, fit)
+            and scene.product.enters_from_above(fit)
         ):
             return Step(f"insert {fit.shaft}", INSERT_SHAFT, parts, fit, riders)
     return None

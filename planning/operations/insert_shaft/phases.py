@@ -7,9 +7,9 @@ from collections.abc import Iterator
 from cell.products.joints import Fit
 from cell.products.product import Product
 from cell.simulation.phase import Phase
-from planning.feasibility.directions import unit_vector
-from planning.operations.mating import Mating, foresee_mating, mate
+from planning.operations.mating import foresee_mating, mate, mating_at_hole
 from planning.operations.operation import Step
+from planning.operations.soft_hand import Mating
 from planning.operations.station import Station
 
 
@@ -25,13 +25,6 @@ def foresee(station: Station, step: Step) -> tuple[str, ...]:
 
 
 def mating_of(product: Product, step: Step) -> Mating:
-    """Return what a step brings to what.
-
-    The compliance centre is where the part in the hand meets the other one first: at the mouth of
-    its hole, or at the tip of its shaft.
-    """
-    fit, up = step.joint, unit_vector(product.up)
-    assert isinstance(fit, Fit)
-    if step.parts == (fit.hole,):
-        return Mating(fit.hole, fit.shaft, fit.p_AoF, fit.depth, up)
-    return Mating(fit.shaft, fit.hole, fit.p_AoF - fit.depth * up, fit.depth, up)
+    """Return what a step brings to what."""
+    assert isinstance(step.joint, Fit)
+    return mating_at_hole(product, step.joint, step.parts[0])

@@ -6,10 +6,10 @@ import numpy as np
 
 from cell.builder import Cell
 from planning.operations.insert_shaft.phases import mating_of
-from planning.operations.mating import SOFT
 from planning.operations.mating_measures import insertion_curve
 from planning.operations.operation import Arrays, StepRecord
 from planning.operations.plot import Plot
+from planning.operations.soft_hand import SOFT
 
 # What a reader asks about the curve.
 SEATED = (

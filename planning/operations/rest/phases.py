@@ -10,8 +10,9 @@ from cell.products.joints import Rest
 from cell.products.product import Product
 from cell.simulation.phase import Phase
 from planning.feasibility.directions import unit_vector
-from planning.operations.mating import Mating, foresee_mating, mate
+from planning.operations.mating import foresee_mating, mate
 from planning.operations.operation import Step
+from planning.operations.soft_hand import Mating
 from planning.operations.station import Station
 
 
