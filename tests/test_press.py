@@ -165,5 +165,5 @@ def test_a_cap_is_pressed_onto_its_post(tmp_path: Path) -> None:
 def check_pressed_home(out: Path) -> None:
     """Check force and seat of the second step of a run."""
     measured = json.loads((out / "result.json").read_text())["steps"][1]["measured"]
-    assert abs(measured["press_force_error"]) < 0.05
+    assert abs(measured["press_force_deviation"]) < 0.05
     assert abs(measured["gap_m"]) < 2e-5

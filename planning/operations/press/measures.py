@@ -31,7 +31,7 @@ def measure(cell: Cell, record: StepRecord, log: Arrays) -> Measured:
             # The least squares of F = F_seat d / d_seat.
             share, felt = depth[fit] / press.depth, force[fit]
             measured["press_force_N"] = float(share @ felt / (share @ share))
-            measured["press_force_error"] = measured["press_force_N"] / press.force - 1.0
+            measured["press_force_deviation"] = measured["press_force_N"] / press.force - 1.0
     return measured
 
 
