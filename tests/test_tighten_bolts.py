@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from types import SimpleNamespace
 from typing import cast
 
@@ -30,7 +29,7 @@ from planning.operations.tighten_bolts.phases import (
     foresee,
     star_order,
 )
-from planning.operations.tighten_bolts.servos import CLUTCH_TIME, Clutch, seat_speed
+from planning.operations.tighten_bolts.servos import CLUTCH_TIME, Clutch
 
 
 def bolts_on_a_circle(count: int) -> tuple[Station, dict[str, np.ndarray]]:
@@ -93,17 +92,6 @@ def test_clutch_trips_on_torque_that_lasts_and_not_on_a_shock(dt: float) -> None
     shock, steps = 0.8, round(CLUTCH_TIME / dt)
     assert trip_time([0.0, shock] * 20, dt) is None
     assert trip_time([0.0, *[0.5] * (steps + 1)], dt) == pytest.approx(2 * dt + CLUTCH_TIME)
-
-
-def test_stiff_joints_are_tightened_slowly() -> None:
-    """In the time of the clutch each joint takes up the same share of its torque, or less."""
-    screws = load_product("motor_unit").screws
-    m3 = screws["bolt_1"]
-    assert seat_speed(m3, 7.0) == 7.0
-    m5 = replace(m3, diameter=5e-3, pitch=0.8e-3)
-    # A force of 3/5 through 3/5 of the compliance, and a coarser thread.
-    assert seat_speed(m5, 7.0) == pytest.approx(7.0 * 1.037 * (3 / 5) ** 2 * 0.5 / 0.8, rel=1e-3)
-    assert seat_speed(replace(m5, torque=0.1 * m5.torque), 7.0) == 1.0
 
 
 @pytest.fixture(scope="module")

@@ -26,15 +26,6 @@ SHANK_FACETS = 8
 STIFFNESS_DIAMETER = 3.0  # [D] `HEAD_STIFFNESS` is that of an M3 head; it grows with the size [mm].
 
 
-def head_stiffness(diameter: float) -> float:
-    """Return the axial stiffness of a screw and its head [N/m].
-
-    Args:
-        diameter: Of the shank [mm].
-    """
-    return HEAD_STIFFNESS * diameter / STIFFNESS_DIAMETER
-
-
 def screw_model(
     name: str,
     whole: trimesh.Trimesh,
@@ -62,8 +53,10 @@ def screw_model(
     radius, tip = diameter / 2.0, TIP * diameter
     # The pressure of a convex solid grows evenly from its underside to its middle.
     area = np.pi * (bearing**2 - (hole + BOLT_HOLE_EDGE) ** 2) * MM**2
-    modulus = head_stiffness(diameter) * high / 2.0 * MM / area
-    head_contact = Contact(FIT_FRICTION, modulus, dissipation=METAL_DISSIPATION)
+    stiffness = HEAD_STIFFNESS * diameter / STIFFNESS_DIAMETER
+    head_contact = Contact(
+        FIT_FRICTION, stiffness * high / 2.0 * MM / area, dissipation=METAL_DISSIPATION
+    )
     thread = Contact(FIT_FRICTION, THREAD_MODULUS, dissipation=METAL_DISSIPATION)
     crown = [(wide / 2.0 * MM, 0.0), (wide / 2.0 * MM, high * MM)]
     body = [

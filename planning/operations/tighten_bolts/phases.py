@@ -45,7 +45,7 @@ from planning.operations.tighten_bolts.search import (
     has_turned,
     stands_on_something,
 )
-from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed, seat_speed
+from planning.operations.tighten_bolts.servos import FEED_LIMIT, Clutch, Feed
 
 PLUNGE_SPEED = 0.08  # Of the bit down to the socket [m/s] [A].
 SLOW_BELOW = 2.5e-4  # The spindle turns slowly when the head is this close to its seat [m] [A].
@@ -289,12 +289,9 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
     yield Phase(
         kinds.tighten,
         Clutch(spindle, kinds.share * screw.torque),
-        timeout=10.0,
+        timeout=5.0,
         subject=bolt,
-        commands={
-            driver.name: feed,
-            spindle: Spin(seat_speed(screw, config.driver.seat_speed)),
-        },
+        commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
         awake=awake,
         mating=mating,
         fine_log=True,

@@ -6,8 +6,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from cell.cad.screw_model import head_stiffness
-from cell.products.joints import Screw
 from cell.simulation.phase import Sensed
 from cell.simulation.vocabulary import in_programs
 from planning.motion.timing import JointMotion
@@ -15,26 +13,6 @@ from planning.motion.timing import JointMotion
 FEED_GAIN = 0.02  # Feed speed per missing thrust [m/s per N] [A].
 FEED_LIMIT = 0.02  # [m/s] [A]
 CLUTCH_TIME = 0.002  # The clutch does not feel shorter shocks [s] [A].
-# Turn from snug to tight of a joint that the whole speed suits [rad] [M]: M3, 0.5 N m, which ends
-# 2 % above its torque.
-SOFT_TURN = 0.1
-SLOWEST = 1.0  # [rad/s] [A]: the last quarter of a millimetre takes seconds.
-
-
-def seat_speed(screw: Screw, fastest: float) -> float:
-    """Return the speed of the spindle while a screw is tightened [rad/s].
-
-    A stiff joint is tight within a few degrees: in the time in which the clutch feels that a torque
-    lasts it would rise far beyond it. The speed is in proportion to the turn that the joint takes.
-
-    Args:
-        screw: What is tightened.
-        fastest: Of the spindle near a seat [rad/s].
-    """
-    force = screw.torque / (screw.nut_factor * screw.diameter)
-    stretch = force / head_stiffness(1e3 * screw.diameter)
-    turn = 2.0 * np.pi * stretch / screw.pitch
-    return min(fastest, max(SLOWEST, fastest * turn / SOFT_TURN))
 
 
 @in_programs
