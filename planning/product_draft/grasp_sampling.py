@@ -42,7 +42,7 @@ GRAVITY = 9.81
 LIFT_FACTOR = 10.0  # [A] Grip over the weight that friction just bears: an arm brakes.
 # [A] Of a pad by the grip [m]: jaws that close 1.5 mm further than expected have lost the part.
 SQUEEZED = 5e-4
-# [M] Of it by the usual grip: 40 N on 8 mm2 of a round hub let it slip out, 15 N held it [-].
+# [A] Of it by the usual grip [-]: 40 N on 8 mm2 of a round hub let it slip out, 15 N held it.
 USUAL_SHARE = 0.5
 USUAL_FORCE, LIGHT = 40.0, 5e-3  # [A] As of the products drawn by hand [N]; lighter: less [kg].
 
