@@ -132,12 +132,16 @@ class Block:
         AddContactMaterial(dissipation=1.0, friction=friction, properties=properties)
         self.plant.RegisterCollisionGeometry(body, X_BG, Box(*size), "box", properties)
 
-    def step(self, force: np.ndarray) -> None:
-        """Advance by one step under a force at the bottom of the block [N]."""
-        F_W = SpatialForce(np.zeros(3), force - [0, 0, PRESS])
+    def step(self, force: np.ndarray, lever: float = 0.0) -> None:
+        """Advance by one step under a force [N] at the bottom of the block, `lever` [m] aside."""
+        pressed = SpatialForce(np.zeros(3), [0.0, 0.0, -PRESS])
+        pulled = SpatialForce(np.zeros(3), force)
         at = np.array([0.0, 0.0, -SIZE[2] / 2])
-        port = self.plant.get_applied_spatial_force_input_port()
-        port.FixValue(self.context, [applied_force(self.body.index(), at, F_W)])
+        forces = [
+            applied_force(self.body.index(), at, pressed),
+            applied_force(self.body.index(), at + [0.0, lever, 0.0], pulled),
+        ]
+        self.plant.get_applied_spatial_force_input_port().FixValue(self.context, forces)
         self.steps += 1
         self.simulator.AdvanceTo(self.steps * DT)
         self.links.step(self.root, DT)
@@ -153,11 +157,13 @@ class Block:
             for i in range(results.num_hydroelastic_contacts())
         ]
 
-    def load_until(self, direction: np.ndarray, ends: Callable[[Block], bool]) -> float:
+    def load_until(
+        self, direction: np.ndarray, ends: Callable[[Block], bool], lever: float = 0.0
+    ) -> float:
         """Raise a force by 5 N/s until something ends; return it [N]."""
         for step in range(8000):
             load = 0.005 * step
-            self.step(load * direction)
+            self.step(load * direction, lever)
             if ends(self):
                 return load
         raise AssertionError("nothing has ended it")
@@ -181,20 +187,23 @@ def test_what_stands_is_linked_and_stays_where_it_is() -> None:
     np.testing.assert_allclose(block.plant.GetPositions(block.context), start, atol=2e-8)
 
 
-def test_link_slips_at_the_load_at_which_full_contact_does() -> None:
-    sideways = np.array([0.8, 0.6, 0.0])
+@pytest.mark.parametrize("direction", [(1.0, 0.0, 0.0), (0.8, 0.6, 0.0), (0.3, -0.95, 0.0)])
+@pytest.mark.parametrize("lever", [0.0, 0.01, 0.03], ids="lever {:g} m".format)
+def test_link_slips_at_the_load_at_which_full_contact_does(
+    direction: tuple[float, ...], lever: float
+) -> None:
+    sideways = np.array(direction)
 
     def slides(block: Block) -> bool:
-        v = block.plant.GetVelocities(block.context)[3:]
-        return float(np.linalg.norm(v)) > 1e-3
+        v = block.plant.GetVelocities(block.context)
+        return float(np.linalg.norm(v[3:]) + np.linalg.norm(v[:3]) * SIZE[0] / 2) > 1e-3
 
-    full = Block(linked=False).load_until(sideways, slides)
+    full = Block(linked=False).load_until(sideways, slides, lever)
     block = Block(linked=True)
-    # What polygons may pull, what friction may be exceeded by, and the steps between checks add up;
-    # which six springs a symmetric contact gets depends on the machine.
-    assert block.load_until(sideways, let_go) == pytest.approx(full, rel=0.04)
+    assert block.load_until(sideways, let_go, lever) == pytest.approx(full, rel=0.02)
     assert ended(block) == ["friction"]
-    assert full == pytest.approx(FRICTION * (PRESS + MASS * GRAVITY), rel=0.02)
+    if lever == 0.0:
+        assert full == pytest.approx(FRICTION * (PRESS + MASS * GRAVITY), rel=0.02)
 
 
 def test_link_opens_at_the_load_at_which_full_contact_does() -> None:

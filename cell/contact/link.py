@@ -37,7 +37,7 @@ FAR = 5e-5
 # A contact would stick with this share to spare when it is linked.
 SPARE = 5 * TOLERANCE
 # A contact is not checked again before its force has changed by this share of the normal one [A].
-NEGLIGIBLE = 0.003
+NEGLIGIBLE = 0.002
 # Tries to find friction that balances the load; a patch near its limit takes most [A].
 REDISTRIBUTIONS = 12
 SPRING_FIELDS = tuple(Springs.__dataclass_fields__)
@@ -194,21 +194,31 @@ class Link:
         return None if self._sticks(sticking, cones) else "friction"
 
     def _sticks(self, wanted: Array, cones: Array) -> bool:
-        """Return whether tangential forces (n, 3) can be spread within friction cones (n,) [N]."""
+        """Return whether forces within friction cones (n,) [N] balance what `wanted` (n, 3) do."""
+        points = self.polygons.points
+        centre, size = self._centre_and_size()
         allowed = TOLERANCE * cones.sum()
+        demand = line_wrenches(points, wanted).sum(axis=0)
         forces = wanted
         for _ in range(REDISTRIBUTIONS):
-            size = np.sqrt(np.sum(forces**2, axis=1))
-            excess = np.maximum(size - cones, 0.0)
-            if excess.sum() <= allowed:
+            lengths = np.sqrt(np.sum(forces**2, axis=1))
+            inside = forces * np.minimum(1.0, cones / np.maximum(lengths, 1e-12))[:, None]
+            lost = demand - line_wrenches(points, inside).sum(axis=0)
+            force, torque = lost[3:], lost[:3] - cross(centre, lost[3:])
+            if np.linalg.norm(force) + np.linalg.norm(torque) / size <= allowed:
                 return True
-            inside = forces * np.minimum(1.0, cones / np.maximum(size, 1e-12))[:, None]
-            lost = line_wrenches(self.polygons.points, forces - inside).sum(axis=0)
-            stuck = size < cones
+            stuck = lengths < cones
             if not stuck.any():
                 return False
             forces = inside + self._spread(lost, self._stick_stiffness() * stuck)
         return False
+
+    def _centre_and_size(self) -> tuple[Array, float]:
+        """Return the contact's centre, and how far its polygons are from there (rms) [m]."""
+        points = self.polygons.points
+        centre = np.average(points, axis=0, weights=self.polygons.areas)
+        size = np.sqrt(np.mean(np.sum((points - centre) ** 2, axis=1)))
+        return centre, max(float(size), 1e-4)
 
     def _stick_stiffness(self) -> Array:
         return TANGENTIAL * self.polygons.areas * self.polygons.gradients
@@ -219,7 +229,7 @@ class Link:
         They add up to the wrench (6,) about Wo as far as tangential forces can.
         """
         points, normals = self.polygons.points, self.polygons.normals
-        centre = np.average(points, axis=0, weights=self.polygons.areas)
+        centre, size = self._centre_and_size()
         arms = points - centre
         about = wrench.copy()
         about[:3] -= cross(centre, wrench[3:])
@@ -229,8 +239,7 @@ class Link:
         ways[:, :, :3] = cross(np.eye(3), arms[:, None]).transpose(0, 2, 1)
         ways -= normals[:, :, None] * np.einsum("ni,nij->nj", normals, ways)[:, None, :]
         K = np.einsum("n,nij,nik->jk", stiffness, ways, ways)
-        size = np.sqrt(np.mean(np.sum(arms**2, axis=1)))
-        scale = np.array([1.0 / max(size, 1e-4)] * 3 + [1.0] * 3)
+        scale = np.array([1.0 / size] * 3 + [1.0] * 3)
         solution = np.linalg.lstsq(K * scale[:, None] * scale, about * scale, rcond=1e-9)[0] * scale
         return np.einsum("n,nij,j->ni", stiffness, ways, solution)
 
