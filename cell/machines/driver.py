@@ -24,12 +24,19 @@ FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
 FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 N_JOINTS = len(FLOAT_JOINTS) + 1
-TURNING = 0.85  # Share of the torque at which it stalls that a bolt still turns at [A].
+# A bolt still turns so fast when its torque is reached [rad/s]: its friction is fully mobilised, and
+# the torque rises by little while the clutch trips [A].
+TRIP_SPEED = 1.0
+
+
+def tightening_speed(torque: float) -> float:
+    """Return the speed to command so that a bolt turns with `TRIP_SPEED` at a torque [N m] [D]."""
+    return TRIP_SPEED + torque / SPINDLE_GAIN
 
 
 def largest_torque(seat_speed: float) -> float:
-    """Return the torque up to which the spindle tightens at a speed [rad/s], in N m [D]."""
-    return TURNING * SPINDLE_GAIN * seat_speed
+    """Return the torque [N m] up to which the spindle tightens at a commanded speed [rad/s] [D]."""
+    return SPINDLE_GAIN * (seat_speed - TRIP_SPEED)
 
 
 @dataclass(frozen=True)

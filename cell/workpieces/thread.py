@@ -17,6 +17,7 @@ friction is lumped into the head's friction coefficient, computed from the nut f
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from enum import Enum
 
@@ -198,9 +199,12 @@ class Thread:
         Of a bit in the drive only its depth is asked: the walls keep it there.
         """
         X_FE = self.bit_frame.CalcPose(context, self.bolt.body_frame())
+        x, y, _ = X_FE.translation()
+        if math.hypot(x, y) > 2 * BIT_GATE.lateral:
+            return False  # Nearly always, and asked in every step.
         misfit = Misfit.between(_X_FE_seated(self.screw, 0).inverse() @ X_FE)
         below_top = self.head_height - self.screw.bit_seat + misfit.axial
-        if below_top > BIT_GATE.axial and misfit.lateral <= 2 * BIT_GATE.lateral:
+        if below_top > BIT_GATE.axial:
             return True
         return misfit.lateral <= BIT_GATE.lateral and misfit.tilt <= BIT_GATE.tilt
 

@@ -15,6 +15,7 @@ from enum import Enum
 import numpy as np
 from pydrake.math import RigidTransform
 
+from cell.machines.driver import tightening_speed
 from cell.simulation.conditions import All, Below, Either, Height, Signal
 from cell.simulation.phase import (
     Command,
@@ -286,12 +287,14 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
             mating=frozenset() if clamped else mating,
         )
         station.driven += (bolt,)
+    torque = kinds.share * screw.torque
+    speed = min(config.driver.seat_speed, tightening_speed(torque))
     yield Phase(
         kinds.tighten,
-        Clutch(spindle, kinds.share * screw.torque),
+        Clutch(spindle, torque),
         timeout=5.0,
         subject=bolt,
-        commands={driver.name: feed, spindle: Spin(config.driver.seat_speed)},
+        commands={driver.name: feed, spindle: Spin(speed)},
         awake=awake,
         mating=mating,
         fine_log=True,
