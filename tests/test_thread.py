@@ -10,6 +10,7 @@ from pydrake.math import RigidTransform, RotationMatrix
 from thread_rig import BOLT, ThreadRig
 
 from cell.errors import UnknownName
+from cell.machines.driver import tightening_speed
 from cell.workpieces.thread import (
     BIT_GATE,
     ENGAGED_MASS_FACTOR,
@@ -105,7 +106,7 @@ def run_down(rig: ThreadRig) -> np.ndarray:
 
 def tighten(rig: ThreadRig) -> tuple[float, float]:
     """Turn until the clutch trips; return torque and clamp force at that moment."""
-    rig.driver.command(rig.root, rig.config.seat_speed)
+    rig.driver.command(rig.root, tightening_speed(rig.screw.torque))
     for _ in range(3000):
         rig.keep_thrust()
         rig.step()

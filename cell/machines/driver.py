@@ -16,8 +16,7 @@ from pydrake.systems.framework import (
 
 from cell.machines.drive import JointDrive, NamedPorts
 
-# Speed loop of the spindle: at the seating speed of 7 rad/s it stalls at 0.7 N m, so that the bolt
-# still turns when the clutch trips at 0.5 N m and friction is fully mobilised [A].
+# Speed loop of the spindle: its speed falls by 10 rad/s per N m, as that of a DC motor does [A].
 SPINDLE_GAIN = 0.1
 # Floating bit holder: lateral and axial springs [N/m], as compliant screwdriving heads have [A].
 FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
