@@ -155,8 +155,8 @@ class DriverConfig:
         above=0.0, at_most=300.0,
     )  # fmt: skip
     seat_speed: float = setting(
-        7.0, "rad/s", "Speed of the spindle when the head is near its seat, at most: each bolt has the "
-        "speed at which 1 rad/s is left at its torque.",
+        7.0, "rad/s", "Speed of the spindle when the head is near its seat, at most: each bolt "
+        "has the speed of which 1 rad/s is left at its torque.",
         "[A] Gives up to 0.6 N m.",
         above=0.0, at_most=300.0,
     )  # fmt: skip

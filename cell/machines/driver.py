@@ -23,8 +23,8 @@ FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
 FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 N_JOINTS = len(FLOAT_JOINTS) + 1
-# A bolt still turns so fast when its torque is reached [rad/s]: its friction is fully mobilised, and
-# the torque rises by little while the clutch trips [A].
+# So fast a bolt still turns when its torque is reached [rad/s]: its friction is fully mobilised,
+# and the torque rises by little while the clutch trips [A].
 TRIP_SPEED = 1.0
 
 
