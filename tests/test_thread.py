@@ -106,7 +106,7 @@ def run_down(rig: ThreadRig) -> np.ndarray:
 
 def tighten(rig: ThreadRig) -> tuple[float, float]:
     """Turn until the clutch trips; return torque and clamp force at that moment."""
-    rig.driver.command(rig.root, tightening_speed(rig.screw.torque))
+    rig.driver.command(rig.root, tightening_speed(rig.screw.torque, rig.screw.diameter))
     for _ in range(3000):
         rig.keep_thrust()
         rig.step()

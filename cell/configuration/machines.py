@@ -155,9 +155,9 @@ class DriverConfig:
         above=0.0, at_most=300.0,
     )  # fmt: skip
     seat_speed: float = setting(
-        7.0, "rad/s", "Speed of the spindle when the head is near its seat, at most: each bolt "
-        "has the speed of which 1 rad/s is left at its torque.",
-        "[A] Gives up to 0.6 N m.",
+        8.0, "rad/s", "Speed of the spindle when the head is near its seat, at most: each bolt "
+        "has the speed of which enough is left at its torque (`TRIP_SPEED`).",
+        "[A] Tightens M3 to 0.6 N m.",
         above=0.0, at_most=300.0,
     )  # fmt: skip
     push_force: float = setting(

@@ -23,19 +23,25 @@ FLOAT_JOINTS = ("float_x_joint", "float_y_joint", "float_z_joint")
 FLOAT_STIFFNESS = (3e3, 3e3, 2e3)
 FLOAT_DAMPING = (25.0, 25.0, 20.0)
 N_JOINTS = len(FLOAT_JOINTS) + 1
-# So fast a bolt still turns when its torque is reached [rad/s]: its friction is fully mobilised,
-# and the torque rises by little while the clutch trips [A].
-TRIP_SPEED = 1.0
+# Speed of a bolt's circumference when its torque is reached [m/s], 2 rad/s for M3 [M]: with less,
+# regularised friction under the head is not fully mobilised and the clamp force too high (by 9 % in
+# place of 5 % at 1 rad/s); with more, the torque rises too far while the clutch trips.
+TRIP_SPEED = 3e-3
 
 
-def tightening_speed(torque: float) -> float:
-    """Return the speed to command so that a bolt turns with `TRIP_SPEED` at a torque [N m] [D]."""
-    return TRIP_SPEED + torque / SPINDLE_GAIN
+def tightening_speed(torque: float, diameter: float) -> float:
+    """Return the spindle speed to command [rad/s] so that a bolt still turns at its torque [D].
+
+    Args:
+        torque: Of the bolt [N m].
+        diameter: Of its thread [m].
+    """
+    return TRIP_SPEED / (diameter / 2) + torque / SPINDLE_GAIN
 
 
-def largest_torque(seat_speed: float) -> float:
-    """Return the torque [N m] up to which the spindle tightens at a commanded speed [rad/s] [D]."""
-    return SPINDLE_GAIN * (seat_speed - TRIP_SPEED)
+def largest_torque(speed: float, diameter: float) -> float:
+    """Return the torque [N m] up to which a commanded speed suffices: `tightening_speed` undone."""
+    return SPINDLE_GAIN * (speed - TRIP_SPEED / (diameter / 2))
 
 
 @dataclass(frozen=True)

@@ -90,17 +90,18 @@ def _why_no_grasp(part: Part, gripper: GripperModel, up: str) -> str:
 
 
 def _screws(product: Product, config: CellConfig) -> Iterator[Finding]:
-    most = largest_torque(config.driver.seat_speed)
-    asked: dict[float, list[str]] = {}
+    speed = config.driver.seat_speed
+    asked: dict[tuple[float, float], list[str]] = {}
     for name, screw in product.screws.items():
-        asked.setdefault(screw.torque, []).append(name)
-    for torque, names in asked.items():
+        asked.setdefault((screw.torque, screw.diameter), []).append(name)
+    for (torque, diameter), names in asked.items():
         subject = ", ".join(names)
+        most = largest_torque(speed, diameter)
         if torque > most:
             yield fails(
                 subject,
                 f"{torque:.3g} N m, and the driver gives {most:.3g} at driver.seat_speed = "
-                f"{config.driver.seat_speed:g} rad/s",
+                f"{speed:g} rad/s",
             )
         else:
             yield good(subject, f"{torque:.3g} N m of the {most:.3g} that the driver gives")

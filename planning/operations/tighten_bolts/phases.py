@@ -288,7 +288,7 @@ def tighten_bolt(station: Station, bolt: str, kinds: Pass) -> Generator[Phase, O
         )
         station.driven += (bolt,)
     torque = kinds.share * screw.torque
-    speed = min(config.driver.seat_speed, tightening_speed(torque))
+    speed = min(config.driver.seat_speed, tightening_speed(torque, screw.diameter))
     yield Phase(
         kinds.tighten,
         Clutch(spindle, torque),
