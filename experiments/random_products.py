@@ -109,7 +109,7 @@ def _trial(number: int, folder: Path, config: CellConfig, only_check: bool) -> T
 
     own = folder / "own"
     try:
-        source = write_cad(drawing, folder / "cad")
+        source = write_cad(drawing.parts, folder / "cad")
         run_init(Wanted(source, units="mm"), own, config, quiet=True)
         clock.append(time.process_time())
         product = load_product(own / PRODUCT_FILE)

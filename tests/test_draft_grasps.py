@@ -3,12 +3,13 @@
 import fcl
 import numpy as np
 import pytest
-from drawn_products import box_with_lid, meshes
+from drawn_products import meshes
 from manifold3d import Manifold
 
 from cell.cad.motor_unit import mesh
 from cell.cad.shapes import box, cylinder
 from cell.machines.grippers import HAND_E
+from experiments.product.drawings import box_with_lid
 from planning.product_draft.depth_maps import DepthMaps
 from planning.product_draft.grasp_sampling import ABOVE_GROUND, PAD_FRICTION, sample_grasps
 from planning.product_draft.hand_shape import HandShape, surface

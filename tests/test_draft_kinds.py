@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import trimesh
-from drawn_products import covered_block, meshes, screw, write_meshes
+from drawn_products import covered_block, meshes
 from manifold3d import Manifold
 from pydrake.geometry import Box
 from pydrake.math import RigidTransform
@@ -23,6 +23,8 @@ from cell.products.loading import load_product
 from cell.products.product import Part
 from cell.products.read_options import ReadOptions
 from experiments.cli.main import main
+from experiments.product.drawings import screw
+from experiments.product.random_drawing import write_cad
 from planning.assembly_plan.planner import plan
 from planning.fixture_analysis.candidate import FixtureSetup
 from planning.product_check.check import bed_findings, plan_findings
@@ -43,7 +45,7 @@ HAND = HandShape(HAND_E)
 
 
 def read(parts: dict[str, Manifold], folder: Path):  # noqa: ANN201
-    return load_product(write_meshes(parts, folder), ReadOptions(units="mm"))
+    return load_product(write_cad(parts, folder), ReadOptions(units="mm"))
 
 
 # Screws.
@@ -237,7 +239,7 @@ def test_the_bed_holds_a_turned_part_by_its_foot_and_not_by_its_shaft(tmp_path: 
 def test_a_fixed_part_that_the_bed_does_not_touch_is_refused(tmp_path: Path) -> None:
     """A straight pin that another part comes over: its contact model is the shaft's."""
     parts = {"pin": cylinder(7.0, 0, 60), "cap": cylinder(12.0, 40, 64) - cylinder(7.06, 39, 60)}
-    source, out = write_meshes(parts, tmp_path / "cad"), tmp_path / "own"
+    source, out = write_cad(parts, tmp_path / "cad"), tmp_path / "own"
     order = ["--order", "pin,cap"]
     assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet", *order]) == 0
     product = load_product(out / "product.yaml")

@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from drawn_products import box_with_lid, covered_block
+from drawn_products import covered_block
 from manifold3d import Manifold
 
 from cell.cad.shapes import box, cylinder
+from experiments.product.drawings import box_with_lid
 from planning.product_draft.engagement import PLAY, PRECISE, engagement
 
 UP = np.array([0.0, 0.0, 1.0])

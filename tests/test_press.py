@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import capped_post, pressed_block, write_meshes
+from drawn_products import capped_post, pressed_block
 from manifold3d import Manifold
 from pydrake.math import RigidTransform
 
@@ -20,6 +20,7 @@ from cell.products.product import Product
 from cell.simulation.state import restore_state, save_state
 from cell.workpieces.press_fit import FitState
 from experiments.cli.main import main
+from experiments.product.random_drawing import write_cad
 from planning.assembly_plan.planner import plan
 from planning.operations.press import PRESS
 from planning.operations.sequence import steps
@@ -29,7 +30,7 @@ from planning.product_check.finding import Level
 
 def drafted(folder: Path, drawn: Mapping[str, Manifold], *materials: str) -> Path:
     """Return the product file that is drafted from what is drawn."""
-    source, out = write_meshes(drawn, folder / "cad"), folder / "own"
+    source, out = write_cad(drawn, folder / "cad"), folder / "own"
     given = [word for material in materials for word in ("--material", material)]
     assert main(["init", str(source), "--units", "mm", *given, "--out", str(out), "--quiet"]) == 0
     return out / "product.yaml"

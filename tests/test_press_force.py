@@ -4,12 +4,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import pinned_block, write_meshes
+from drawn_products import pinned_block
 
 from cell.products.loading import load_product
 from cell.products.materials import DENSITIES, MODULI
 from cell.products.press_force import FRICTION, Ring, press_force
 from cell.products.read_options import ReadOptions
+from experiments.product.random_drawing import write_cad
 from planning.product_draft.draft import DraftOptions, draft_product
 
 
@@ -37,7 +38,7 @@ def test_every_material_has_its_modulus() -> None:
 
 def test_the_force_of_a_drafted_press_fit(tmp_path: Path) -> None:
     """20 um radially at 16 mm, 16 mm deep, aluminium: several kilonewtons."""
-    source = write_meshes(pinned_block(-0.02), tmp_path / "cad")
+    source = write_cad(pinned_block(-0.02), tmp_path / "cad")
     cad = load_product(source, ReadOptions(units="mm"))
     drafted = draft_product(cad, tmp_path, DraftOptions()).product
     (press,) = drafted.presses

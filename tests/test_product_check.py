@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import bar_puzzle, bearing_block, box_with_lid, covered_block, write_meshes
+from drawn_products import covered_block
 from manifold3d import Manifold
 from pydrake.math import RigidTransform, RotationMatrix
 
@@ -18,7 +18,8 @@ from cell.products.loading import load_product
 from cell.products.product import Grasp, Part, Product
 from experiments.assembly.prepare import RunningCell
 from experiments.cli.main import main
-from experiments.product.random_drawing import draw
+from experiments.product.drawings import bar_puzzle, bearing_block, box_with_lid
+from experiments.product.random_drawing import draw, write_cad
 from planning.assembly_plan.planner import plan
 from planning.operations.counter_hold import from_the_side
 from planning.operations.tighten_bolts.phases import holdable
@@ -41,7 +42,7 @@ CONFIG = CellConfig()
 def file(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """The product file of a block, a cover and two screws, drafted from meshes."""
     folder = tmp_path_factory.mktemp("covered")
-    source = write_meshes(covered_block(), folder / "cad")
+    source = write_cad(covered_block(), folder / "cad")
     out = folder / "own"
     assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet"]) == 0
     return out / "product.yaml"
@@ -270,7 +271,7 @@ def test_a_product_without_a_tray(file: Path, tmp_path: Path) -> None:
 
 def own_product(drawn: Mapping[str, Manifold], folder: Path) -> str:
     """Return the product file that is drafted from what is drawn."""
-    source, out = write_meshes(drawn, folder / "cad"), folder / "own"
+    source, out = write_cad(drawn, folder / "cad"), folder / "own"
     assert main(["init", str(source), "--units", "mm", "--out", str(out), "--quiet"]) == 0
     return str(out / "product.yaml")
 

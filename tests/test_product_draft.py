@@ -7,15 +7,7 @@ import numpy as np
 import pytest
 import trimesh
 import yaml
-from drawn_products import (
-    box_with_lid,
-    covered_block,
-    gear_pair,
-    meshes,
-    pinned_block,
-    screw,
-    write_meshes,
-)
+from drawn_products import covered_block, meshes, pinned_block
 from pydrake.geometry import Box
 
 from cell.cad.nests import PEDESTAL, rail_nest, stop_nest
@@ -28,6 +20,8 @@ from cell.products.materials import DENSITIES, material_in, material_named
 from cell.products.read_options import ReadOptions
 from cell.products.screw_table import NUT_FACTOR, SIZES, head_of, size_of
 from experiments.cli.main import main
+from experiments.product.drawings import box_with_lid, gear_pair, screw
+from experiments.product.random_drawing import write_cad
 from planning.assembly_plan.planner import plan
 from planning.operations.operation import NoOperation
 from planning.operations.sequence import steps
@@ -40,7 +34,7 @@ MM = 1e-3
 
 def drafted(folder: Path, parts: dict, **options: object) -> Draft:  # pyright: ignore
     """Return the draft of parts that are written as STL files first."""
-    source = write_meshes(parts, folder / "cad")
+    source = write_cad(parts, folder / "cad")
     cad = load_product(source, ReadOptions(units="mm"))
     return draft_product(cad, folder, DraftOptions(**options))  # pyright: ignore
 
@@ -271,7 +265,7 @@ def test_parts_that_cannot_be_assembled_are_said(tmp_path: Path) -> None:
 def test_init_writes_a_product_that_is_read_back(tmp_path: Path) -> None:
     """With a name that YAML would take for something else, and a comment on every guess."""
     parts = {("2e3" if n == "cover" else n): m for n, m in covered_block().items()}
-    source = write_meshes(parts, tmp_path / "cad")
+    source = write_cad(parts, tmp_path / "cad")
     out = tmp_path / "my product"
     arguments = ["init", str(source), "--units", "mm", "--out", str(out), "--quiet"]
     assert main([*arguments, "--torque", "0.4", "--material", "2e3=brass"]) == 0
@@ -303,7 +297,7 @@ def test_init_writes_a_product_that_is_read_back(tmp_path: Path) -> None:
 def test_bad_input_is_one_line_and_nothing_is_left(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], more: list[str], said: str
 ) -> None:
-    source = write_meshes(covered_block(), tmp_path / "cad")
+    source = write_cad(covered_block(), tmp_path / "cad")
     out = tmp_path / "out"
     assert main(["init", str(source), "--units", "mm", "--out", str(out), *more]) == 2
     error = capsys.readouterr().err

@@ -7,12 +7,13 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from drawn_products import covered_block, write_meshes
+from drawn_products import covered_block
 
 from cell import load_product
 from cell.errors import InputError
 from cell.products.read_options import ReadOptions
 from experiments import product_variants
+from experiments.product.random_drawing import write_cad
 from experiments.studies.variant_input import read_table, write_variant
 
 MM = ReadOptions(units="mm")
@@ -21,7 +22,7 @@ MM = ReadOptions(units="mm")
 @pytest.fixture(scope="module")
 def block(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Return a folder of STL: a block, its cover of 5 mm, and two screws."""
-    return write_meshes(covered_block(), tmp_path_factory.mktemp("cad") / "block")
+    return write_cad(covered_block(), tmp_path_factory.mktemp("cad") / "block")
 
 
 LINES = """variant,cover.z,cover.dz,screw_1.dz,screw_2.dz
@@ -41,8 +42,8 @@ def table(folder: Path, text: str) -> Path:
 def study(block: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[int, Path, dict]:
     """Return exit code, folder and result of a study with the variants of `LINES`, and a twin."""
     folder = tmp_path_factory.mktemp("study")
-    out, twin = folder / "out", write_meshes(covered_block(), folder / "twin")
-    lone = write_meshes({"block": covered_block()["block"]}, folder / "lone")
+    out, twin = folder / "out", write_cad(covered_block(), folder / "twin")
+    lone = write_cad({"block": covered_block()["block"]}, folder / "lone")
     options = ["--units", "mm", "--table", str(table(folder, LINES)), "--order"]
     options += ["block,cover,screw_1,screw_2", "--junit", str(out / "variants.xml"), "--quiet"]
     code = product_variants.main([str(block), str(twin), str(lone), *options, "--out", str(out)])

@@ -6,6 +6,7 @@ designer would: holes with clearance, screws of standard sizes with thread enoug
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 
@@ -68,10 +69,10 @@ def draw(rng: np.random.Generator) -> Drawing:
     return drawing
 
 
-def write_cad(drawing: Drawing, folder: Path) -> Path:
-    """Write the parts of a drawing as STL files in millimetres; return their folder."""
+def write_cad(parts: Mapping[str, Manifold], folder: Path) -> Path:
+    """Write parts, drawn in millimetres, as STL files; return their folder."""
     folder.mkdir(parents=True, exist_ok=True)
-    for name, solid in drawing.parts.items():
+    for name, solid in parts.items():
         to_trimesh(solid).export(folder / f"{name}.stl")
     return folder
 
