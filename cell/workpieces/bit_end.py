@@ -13,10 +13,12 @@ import numpy as np
 from pydrake.geometry import (
     AddContactMaterial,
     AddRigidHydroelasticProperties,
+    CollisionFilterDeclaration,
     Cylinder,
     GeometryId,
     GeometrySet,
     ProximityProperties,
+    Role,
     SceneGraph,
 )
 from pydrake.math import RigidTransform
@@ -58,6 +60,14 @@ class BitEnd:
             "end",
             properties,
         )
+        # It meets what the rest of the bit meets: not the tool that it is part of.
+        inspector = scene_graph.model_inspector()
+        (rest, *_) = set(plant.GetCollisionGeometriesForBody(bit_frame.body())) - {geometry}
+        others = inspector.GetAllGeometryIds(Role.kProximity)
+        unmet = [other for other in others if inspector.CollisionFiltered(rest, other)]
+        filters = CollisionFilterDeclaration()
+        filters.ExcludeBetween(GeometrySet(geometry), GeometrySet(unmet))
+        scene_graph.collision_filter_manager().Apply(filters)
         return BitEnd(scene_graph, geometry)
 
     def set(self, root: Context, *, touches: bool) -> None:

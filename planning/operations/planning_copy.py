@@ -12,8 +12,10 @@ from cell.builder import Cell
 from cell.configuration.config import CellConfig
 from cell.machines.arm import Arm
 from cell.machines.devices import add_arms, make_drives
+from cell.machines.driver import Driver
 from cell.machines.jig_base import fit_to_bag
 from cell.machines.workcell import add_workcell
+from cell.workpieces.bit_end import BitEnd
 from cell.workpieces.parts import add_parts
 from planning.motion.collision_model import CollisionModel
 
@@ -37,6 +39,9 @@ def collision_model(cell: Cell, config: CellConfig) -> CollisionModel:
             CoulombFriction(1.0, 1.0),
         )
         arms = add_arms(plant, config, make_drives(config))
+        for arm in arms.values():
+            if isinstance(arm.tool, Driver):
+                BitEnd.add(plant, scene_graph, arm.tool.bit_frame)
         add_parts(plant, cell.product, config.workcell.X_WT)
         return arms
 
