@@ -18,9 +18,15 @@ from experiments.assembly.prepare import RunningCell
 from planning.motion.timing import JointMotion
 from planning.operations import counter_hold
 from planning.operations.counter_hold import Coming, parking
+from planning.operations.grasping import backed_off
 from planning.operations.operation import Step
-from planning.operations.station import Station
-from planning.operations.tighten_bolts.over_bolt import come_beside, is_reached
+from planning.operations.station import FINE_CLEARANCE, Station
+from planning.operations.tighten_bolts.over_bolt import (
+    BIT_HOVER,
+    come_beside,
+    is_reached,
+    socket_pose,
+)
 from planning.operations.tighten_bolts.phases import (
     DRIVEN,
     FIRST,
@@ -122,6 +128,21 @@ def test_driver_comes_over_the_bolt_while_the_hand_moves(station_with_bolt: Stat
     p_WBolt = station.pose_of("bolt_1").translation()
     np.testing.assert_allclose(p_WE[:2], p_WBolt[:2], atol=1e-6)
     assert p_WE[2] > p_WBolt[2]
+
+
+def test_planner_knows_the_end_of_the_bit(station_with_bolt: Station) -> None:
+    """Only the last millimetres of the bit are in the bolt's head here."""
+    station, driver = station_with_bolt, station_with_bolt.driver
+    tip, near = driver.frame("tool_tip"), driver.positions(station.context)
+    station.model.arrange(station.surroundings(clearance=FINE_CLEARANCE))
+
+    def met(height: float) -> tuple[str, ...]:
+        X_WE = backed_off(socket_pose(station, "bolt_1"), height)
+        q = driver.configurations(station.context, tip, X_WE, near)[0]
+        return station.model.collisions(driver.name, q)
+
+    assert any("right_tool bit - bolt_1" in pair for pair in met(0.0))
+    assert not met(BIT_HOVER)
 
 
 def test_driver_stays_where_the_hand_would_meet_it(station_with_bolt: Station) -> None:
