@@ -65,6 +65,14 @@ def said(findings: Iterator, level: Level) -> str:  # pyright: ignore
     return "\n".join(str(finding) for finding in findings if finding.level is level)
 
 
+def test_a_part_that_the_fixture_bears_needs_nothing_below() -> None:
+    """In the second order the motor comes last, and the plate is brought to it."""
+    unit = load_product("motor_unit")
+    found, todo = plan_findings(unit, plan(unit, ("plate", "bolts", "motor"), config=CONFIG))
+    assert [step.name for step in todo].count("place motor") == 1
+    assert all(finding.level is Level.GOOD for finding in found)
+
+
 def test_a_drafted_product_passes(file: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check", str(file)]) == 0
     printed = capsys.readouterr().out

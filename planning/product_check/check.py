@@ -41,7 +41,8 @@ def plan_findings(product: Product, fixing: FixingPlan) -> tuple[list[Finding], 
         return unknown, []
     names = ", ".join(step.name for step in todo)
     found = [good("order", f"every step has an operation: {names}")]
-    return [*found, *support_findings(product, fixing.order)], todo
+    fixed = {step.fixed_part for step in fixing.steps}
+    return [*found, *support_findings(product, fixing.order, fixed)], todo
 
 
 def fixture_choices(product: Product, fixing: FixingPlan, config: CellConfig) -> tuple[Choice, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 
 import numpy as np
 from manifold3d import Manifold
@@ -18,12 +18,15 @@ LOWER = (0.5, 1.0, 2.0, 3.0, 5.0, 10.0, 20.0, 40.0)  # Where it is looked for wh
 HIT = 0.05  # [A] Volume that parts share when they have met, beyond what they share as drawn [mm3].
 
 
-def support_findings(product: Product, order: tuple[str, ...]) -> Iterator[Finding]:
+def support_findings(
+    product: Product, order: tuple[str, ...], fixed: Collection[str]
+) -> Iterator[Finding]:
     """Yield what is wrong with parts under which nothing is when they come.
 
     Args:
         product: Its parts in assembled poses.
-        order: Items in the order of assembly; the fixture bears the first part.
+        order: Items in the order of assembly.
+        fixed: Names of the parts that the fixture bears when they come.
     """
     up = unit_vector(product.up)
     pressed = {name for joint in product.joints if isinstance(joint, Press) for name in joint.parts}
@@ -33,10 +36,10 @@ def support_findings(product: Product, order: tuple[str, ...]) -> Iterator[Findi
         mesh = part.mesh.copy()
         mesh.apply_transform(np.asarray(part.X_AP.GetAsMatrix4()))
         solid = to_manifold(mesh.apply_scale(1e3))
-        if there is not None and name not in product.screws and name not in pressed:
-            lower = _falls(solid, there, up)
-            if lower is not None:
-                yield fails(name, f"nothing is under it where it is drawn: {lower}")
+        borne = name in product.screws or name in pressed or name in fixed
+        lower = None if there is None or borne else _falls(solid, there, up)
+        if lower is not None:
+            yield fails(name, f"nothing is under it where it is drawn: {lower}")
         there = solid if there is None else there + solid
 
 
