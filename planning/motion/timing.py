@@ -7,6 +7,7 @@ parts, a point of the tool has a speed limit as well.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -94,6 +95,17 @@ class JointMotion:
         """Time from start to end [s]."""
         return float(self.time[-1])
 
+    @staticmethod
+    def joined(motions: Iterable[JointMotion]) -> JointMotion:
+        """Return motions one after the other; each begins where the one before ends."""
+        first, *others = motions
+        time, q, v = [first.time], [first.q], [first.v]
+        for motion in others:
+            time.append(time[-1][-1] + motion.time[1:])
+            q.append(motion.q[1:])
+            v.append(motion.v[1:])
+        return JointMotion(np.concatenate(time), np.concatenate(q), np.concatenate(v))
+
     def delayed(self, delay: float) -> JointMotion:
         """Return the motion after a wait at its start [s], at least 0."""
         if delay == 0.0:
@@ -127,6 +139,8 @@ def time_path(
 ) -> JointMotion:
     """Return the fastest motion along a path, from rest to rest.
 
+    Where that is too hard for the solver, the motion stops at every waypoint.
+
     Args:
         arm: The arm; its joint speed and torque limits apply.
         context: Plant context; the tool's joints count as they are in it.
@@ -155,9 +169,22 @@ def time_path(
     if tool_limit is not None:
         toppra.AddFrameTranslationalSpeedLimit(plant.GetFrameByName(POINT), tool_limit.speed)
     progress = toppra.SolvePathParameterization()
-    if progress is None:
+    if progress is not None:
+        return _sampled(curve, progress, pace.ramp_time)
+    if len(path.waypoints) == 2:
         raise NoTiming(arm.name, path.length)
-    return _sampled(curve, progress, pace.ramp_time)
+    # Beside a segment of a fraction of a milliradian, a corner is too sharp for the solver.
+    return JointMotion.joined(
+        time_path(
+            arm,
+            context,
+            JointPath.through(segment, 0.0),
+            pace,
+            payload=payload,
+            tool_limit=tool_limit,
+        )
+        for segment in zip(path.waypoints, path.waypoints[1:], strict=False)
+    )
 
 
 def _arm_alone(
