@@ -42,6 +42,19 @@ def test_part_comes_to_rest_on_the_soft_bed(posture: str) -> None:
     assert rig.bed_force == pytest.approx(weight, rel=0.1)
 
 
+@pytest.mark.parametrize("posture", POSTURES)
+def test_how_deep_a_hand_presses_does_not_depend_on_the_step(posture: str) -> None:
+    """On its own, a plate has a softer bed at 1 ms; in a hand it has that of the beads."""
+    name, up = POSTURES[posture]
+    specimen = ProductPart(load_product("motor_unit").parts[name], up)
+    depths = []
+    for time_step in (1e-3, 2.5e-4):
+        rig = ElementRig(part=specimen, press_force=PRESS_FORCE, time_step=time_step)
+        rig.lower_to(0.025, speed=0.08)
+        depths.append(rig.depth)
+    assert depths[0] == pytest.approx(depths[1], rel=0.02)
+
+
 def test_half_the_step_comes_to_rest_as_well() -> None:
     rig, pressed, speeds = released("plate P2", 5e-4)
     assert speeds[-100:].max() < 2e-3
