@@ -111,7 +111,8 @@ def test_part_that_falls_over_is_a_failure_with_a_full_report(tmp_path: Path) ->
     assert result["verdict"] == "failure"
     assert (case["part"], case["posture"]) == ("motor", "P2")
     assert (case["trials"], case["successes"], case["expected"]) == (1, 0, "success")
-    assert case["measured"]["tilt_rad"] > 0.5
+    (failure,) = case["failures"]
+    assert failure["phase"] == "settle" or case["measured"]["tilt_rad"] > 0.5  # It may roll off.
     assert result["real_time_factor"] > 0
     assert "force plate" in (tmp_path / "report.html").read_text()
     (state,) = tmp_path.glob("trials/*/failed_state.npz")
