@@ -45,7 +45,6 @@ def judged(
             found and pose_error(surface, found.X_WP, X_DP, found.covariance, pinhole, X_DC)
         )
     scores = pose_scores(errors)
-    larger = scores["normalised_error"]
-    scale = net.card.covariance_scale * (max(1.0, larger) if np.isfinite(larger) else 1.0)
-    rounded = {name: round(value, 4) for name, value in scores.items()}
+    scale = net.card.covariance_scale * max(1.0, scores["normalised_error"] or 1.0)
+    rounded = {name: value and round(value, 4) for name, value in scores.items()}
     return replace(net.card, covariance_scale=round(scale, 2), scores=rounded)

@@ -25,7 +25,7 @@ from planning.perception.surface import Surface
 Array = NDArray[np.float64]
 
 NETS = MODELS / "keypoints"
-TRAINING = "python -m experiments.train_keypoints"
+TRAINING = "python -m experiments.train_keypoints"  # By which nets come about.
 KEYPOINTS = 9  # [R] PVNet: the centre and eight of the surface.
 AROUND = 1.15  # Edge of a close-up by the diagonal of the part [A]: with some of what is around it.
 GRAIN = 1e-6  # To which a mesh has to be the same [m]: less than its file holds.
@@ -116,17 +116,21 @@ class KeypointCard:
         )
 
 
-def net_file(part: str) -> Path:
-    """Return the file of the net for a part that comes with the project.
+def net_file(part: str, folder: Path = NETS) -> Path:
+    """Return the file of the net for a part.
+
+    Args:
+        part: Name of the part.
+        folder: Of nets; by default those that come with the project.
 
     Raises:
         InputError: There is none.
     """
-    file = NETS / f"{part}.onnx"
-    if not file.is_file():
-        known = ", ".join(sorted(path.stem for path in NETS.glob("*.onnx"))) or "none"
+    file = folder / f"{part}.onnx"
+    if not is_file(possible_path(file)):
+        known = ", ".join(sorted(path.stem for path in folder.glob("*.onnx"))) or "none"
         raise InputError(
-            f"No net for part '{part}' in '{NETS}' (there: {known}): train one, {TRAINING}."
+            f"No net for part '{part}' in '{folder}' (there: {known}): train one, {TRAINING}."
         )
     return file
 

@@ -21,8 +21,10 @@ FEWEST = 20  # Pixels: fewer are no part [A].
 MOST = 1_000  # Pixels that vote; more say the same again [A].
 HYPOTHESES = 256  # Of each keypoint [A]; PVNet: 128.
 CROSSING = 0.1  # Least sine of the angle between two lines that give a hypothesis [A].
-AGREES = np.cos(np.deg2rad(8.0))  # [R] PVNet: 0.99.
-BELIEVED = np.cos(np.deg2rad(15.0))  # Of a pixel that counts in the end [A].
+AGREES = np.deg2rad(8.0)  # [R] PVNet: cosine 0.99.
+# Between which it is that a pixel may point past a keypoint in the end, three standard deviations of
+# those that point nearly there [A].
+SHARPEST, BLUNTEST = np.deg2rad(1.0), np.deg2rad(15.0)
 # A pixel nearer to the keypoint than this is off by a distance rather than an angle [pixels] [A].
 NEAR = 4.0
 ROUNDS = 5  # Of adjusting a keypoint.
@@ -78,12 +80,14 @@ def _meeting(pixels: Array, units: Array, rng: np.random.Generator) -> tuple[Arr
             (offsets[j] * normals[i, 0] - offsets[i] * normals[j, 0]) / sine,
         ]
     )
-    weights = [_agreeing(point, pixels, units, AGREES).sum() for point in crossings]
-    point = crossings[np.argmax(weights)]
+    weights = [(_past(point, pixels, units) < AGREES).sum() for point in crossings]
+    point, covariance = crossings[np.argmax(weights)], np.zeros((2, 2))
     for _ in range(ROUNDS):
-        believed = _agreeing(point, pixels, units, BELIEVED)
-        if believed.sum() < FEWEST:
+        past = _past(point, pixels, units)
+        near = past[past < BLUNTEST]
+        if len(near) < FEWEST:
             return None
+        believed = past < np.clip(3.0 * 1.4826 * np.median(near), SHARPEST, BLUNTEST)
         step, covariance = _adjusted(point, pixels[believed], units[believed])
         point = point + step
     return point, covariance
@@ -105,8 +109,8 @@ def _adjusted(point: Array, pixels: Array, units: Array) -> tuple[Array, Array]:
     return -inverse @ pull.sum(axis=0), inverse @ (pull.T @ pull) @ inverse
 
 
-def _agreeing(point: Array, pixels: Array, units: Array, cosine: float) -> NDArray[np.bool_]:
-    """Return which pixels point to a point, but for an angle."""
+def _past(point: Array, pixels: Array, units: Array) -> Array:
+    """Return the angles (n,) by which pixels point past a point [rad]."""
     ray = point - pixels
-    ahead = np.einsum("ij,ij->i", ray, units)
-    return ahead >= cosine * np.linalg.norm(ray, axis=1)
+    across = units[:, 0] * ray[:, 1] - units[:, 1] * ray[:, 0]
+    return np.abs(np.arctan2(across, np.einsum("ij,ij->i", ray, units)))
