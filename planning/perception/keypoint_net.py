@@ -87,7 +87,7 @@ class KeypointNet:
         regions, count = label(output[0] > 0.0)  # type: ignore[misc]
         largest = 1 + int(np.argmax(np.bincount(regions.ravel())[1:])) if count else -1
         row, column = np.nonzero(regions == largest)
-        directions = output[1:, row, column].T.reshape(len(row), -1, 2)
+        directions = output[1:, row, column].T.reshape(len(row), len(output) // 2, 2)
         return Seen(centres(np.column_stack([column, row]), self.card.stride), directions)
 
 

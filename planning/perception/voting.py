@@ -22,8 +22,8 @@ MOST = 1_000  # Pixels that vote; more say the same again [A].
 HYPOTHESES = 256  # Of each keypoint [A]; PVNet: 128.
 CROSSING = 0.1  # Least sine of the angle between two lines that give a hypothesis [A].
 AGREES = np.deg2rad(8.0)  # [R] PVNet: cosine 0.99.
-# Between which it is that a pixel may point past a keypoint in the end, three standard deviations of
-# those that point nearly there [A].
+# Least and most by which a pixel may point past a keypoint in the end; between, it is three
+# standard deviations of those that point nearly there [A].
 SHARPEST, BLUNTEST = np.deg2rad(1.0), np.deg2rad(15.0)
 # A pixel nearer to the keypoint than this is off by a distance rather than an angle [pixels] [A].
 NEAR = 4.0
