@@ -24,6 +24,7 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
@@ -108,27 +109,30 @@ def run(options: Options) -> int:
             "versions": versions(),
         }
         write_json(out / "poses.json", report)
-    Console(quiet=options.common.quiet).print(_table(rows))
+    for estimator in looking.estimator:
+        Console(quiet=options.common.quiet).print(_table(estimator, rows))
     return 0
 
 
-def _table(rows: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> Table:
-    title = "Poses estimated on the jig; small: 1 mm, 1 deg; errors at 50/90 %"
-    table = Table(title=title, title_justify="left")
-    headings = ("posture", "by", "found", "small", "ADD", "ADD-S", "5 px", "5 cm 5 deg", "mm",
-                "yaw deg", "tilt deg", "CPU s")  # fmt: skip
+def _table(estimator: str, rows: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> Table:
+    title = (f"Poses on the jig by {estimator}; shares of looks in %: found, within 1 mm and 1 deg, "
+             "ADD, ADD-S, 5 px, 5 cm and 5 deg; errors at 50/90 %")  # fmt: skip
+    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
+    headings = ("posture", "looks", "found", "1 mm", "ADD", "-S", "5 px", "5 cm", "mm", "yaw deg",
+                "tilt deg", "CPU s")  # fmt: skip
     for heading in headings:
-        left = heading in ("posture", "by")
-        table.add_column(heading, justify="left" if left else "right")
+        table.add_column(heading, justify="left" if heading == "posture" else "right")
     shares = ("within_1_mm_1_deg", "add", "add_s", "under_5_px", "under_5_cm_5_deg")
     for label, by_estimator in rows.items():
-        for estimator, row in by_estimator.items():
-            percents = [f"{100 * (row[name] or 0.0):.0f} %" for name in shares]
-            pairs = ["/".join(_two_digits(row[f"{name}_{p}"]) for p in (50, 90))
-                     for name in ("translation", "yaw_deg", "tilt_deg")]  # fmt: skip
-            found = f"{row['found']}/{row['looks']}"
-            cpu = _two_digits(row["cpu_seconds"])
-            table.add_row(label, estimator, found, *percents, *pairs, cpu)
+        row = by_estimator[estimator]
+        looks, found = row["looks"] or 0, row["found"] or 0
+        percents = [found / max(looks, 1), *(row[name] or 0.0 for name in shares)]
+        pairs = ["/".join(_two_digits(row[f"{name}_{p}"]) for p in (50, 90))
+                 for name in ("translation", "yaw_deg", "tilt_deg")]  # fmt: skip
+        table.add_row(
+            label, str(looks), *(f"{100 * share:.0f}" for share in percents), *pairs,
+            _two_digits(row["cpu_seconds"]),
+        )  # fmt: skip
     return table
 
 

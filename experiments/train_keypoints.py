@@ -31,9 +31,11 @@ from experiments.cli.ending import exit_code
 from experiments.reporting.output import output_folder, write_text
 from experiments.vision.held_out import judged
 from experiments.vision.labelled_views import LabelledView, part_of, read_views
+from experiments.vision.symmetry import same_after
 from planning.perception.keypoint_card import KeypointCard
 from planning.perception.keypoint_net import KeypointNet
 from planning.perception.opencv import opencv
+from planning.perception.surface import Surface
 
 PRODUCT = "motor_unit"
 CHECKPOINT = "checkpoint.pt"
@@ -84,6 +86,11 @@ def run(options: Options) -> int:
     _check(options)
     part = part_of(options.dataset)
     mesh = load_product(PRODUCT).parts[part].mesh
+    if turn := same_after(Surface.of(mesh)):
+        raise InputError(
+            f"Part '{part}' looks the same after a turn by {turn[0]:g} degrees about {turn[1]}: "
+            "its keypoints are not where a picture could tell."
+        )
     dataset = read_views(options.dataset, mesh)
     learned, kept = split(dataset.views)
     from experiments.vision.training import Training

@@ -18,9 +18,11 @@ from experiments import train_keypoints
 from experiments.vision.bop import LabelledImage, box_centre, write_head, write_scene
 from experiments.vision.labelled_views import LabelledViews, part_of, read_views
 from experiments.vision.lighting import random_lighting, unseen_lighting
+from experiments.vision.symmetry import same_after
 from experiments.vision.training_images import batch
 from planning.perception.keypoint_card import KeypointCard
 from planning.perception.keypoint_net import centres
+from planning.perception.surface import Surface
 from planning.perception.voting import vote
 
 PINHOLE = Pinhole.centred(212, 120, 106.0)
@@ -116,6 +118,20 @@ def test_close_ups_say_where_keypoints_are(read: LabelledViews, mesh: trimesh.Tr
         # The part is bright where the mask says so, whatever the light, but for what is before it.
         inside = image[::4, ::4].mean(axis=2)[mask > 0]
         assert np.median(inside) > np.median(image)
+
+
+def test_turns_that_nothing_shows() -> None:
+    parts = load_product("motor_unit").parts
+    assert same_after(Surface.of(parts["motor"].mesh)) is None  # Its shaft is off the axis.
+    assert same_after(Surface.of(parts["plate"].mesh)) is None
+    wheel = trimesh.creation.annulus(0.01, 0.03, 0.01)
+    assert same_after(Surface.of(wheel)) == (180.0, "x")
+    for k in range(6):  # A tooth every 60 degrees, on one side.
+        tooth = trimesh.creation.box([8e-3, 6e-3, 1e-2]).apply_translation([0.033, 0.0, 6e-3])
+        turn = trimesh.transformations.rotation_matrix(np.deg2rad(60 * k), [0, 0, 1])
+        wheel = trimesh.util.concatenate([wheel, tooth.apply_transform(turn)])
+    assert isinstance(wheel, trimesh.Trimesh)
+    assert same_after(Surface.of(wheel)) == (180.0, "z")
 
 
 def test_light_that_is_unseen_is_not_among_what_is_collected() -> None:
