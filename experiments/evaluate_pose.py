@@ -24,7 +24,6 @@ from pathlib import Path
 from typing import Annotated
 
 import tyro
-from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
@@ -115,10 +114,12 @@ def run(options: Options) -> int:
 
 
 def _table(estimator: str, rows: Mapping[str, Mapping[str, Mapping[str, float | None]]]) -> Table:
-    title = (f"Poses on the jig by {estimator}; shares of looks in %: found, within 1 mm and 1 deg, "
-             "ADD, ADD-S, 5 px, 5 cm and 5 deg; errors at 50/90 %")  # fmt: skip
-    table = Table(title=title, title_justify="left", box=SIMPLE_HEAD, padding=(0, 1, 0, 0))
-    headings = ("posture", "looks", "found", "1 mm", "ADD", "-S", "5 px", "5 cm", "mm", "yaw deg",
+    title = (
+        f"Poses on the jig by {estimator}. Shares of looks in %: found, within 1 mm and 1 deg, "
+        "ADD, ADD-S, 5 px, 5 cm and 5 deg. Errors at 50/90 %."
+    )
+    table = Table(title=title, title_justify="left", box=None, padding=(0, 1, 0, 0))
+    headings = ("posture", "n", "found", "1 mm", "ADD", "-S", "5 px", "5 cm", "mm", "yaw deg",
                 "tilt deg", "CPU s")  # fmt: skip
     for heading in headings:
         table.add_column(heading, justify="left" if heading == "posture" else "right")
@@ -127,17 +128,19 @@ def _table(estimator: str, rows: Mapping[str, Mapping[str, Mapping[str, float | 
         row = by_estimator[estimator]
         looks, found = row["looks"] or 0, row["found"] or 0
         percents = [found / max(looks, 1), *(row[name] or 0.0 for name in shares)]
-        pairs = ["/".join(_two_digits(row[f"{name}_{p}"]) for p in (50, 90))
+        pairs = ["/".join(_short(row[f"{name}_{p}"]) for p in (50, 90))
                  for name in ("translation", "yaw_deg", "tilt_deg")]  # fmt: skip
         table.add_row(
             label, str(looks), *(f"{100 * share:.0f}" for share in percents), *pairs,
-            _two_digits(row["cpu_seconds"]),
+            _short(row["cpu_seconds"]),
         )  # fmt: skip
     return table
 
 
-def _two_digits(value: float | None) -> str:
-    return "-" if value is None else f"{value:.2f}"
+def _short(value: float | None) -> str:
+    if value is None:
+        return "-"
+    return f"{value:.2f}" if value < 10.0 else f"{value:.0f}"
 
 
 if __name__ == "__main__":
