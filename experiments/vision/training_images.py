@@ -1,8 +1,10 @@
 """What a net for keypoints learns from: close-ups of labelled pictures, each time a bit different.
 
 A close-up is aimed beside the part, turned and scaled at random, since neither is known when the
-net is used. Then what is around the part is covered with patches, and something is put in front of
-it; a shadow falls, and colours, sharpness and noise change. Ranges are [A].
+net is used. In half of them the part is in other surroundings, from elsewhere in the pictures: the
+part lies about the same way on the jig every time, and the jig must not tell how. Then what is
+around the part is covered with patches, and something is put in front of it; a shadow falls, and
+colours, sharpness and noise change. Ranges are [A].
 """
 
 from __future__ import annotations
@@ -25,6 +27,7 @@ Array = NDArray[np.float64]
 ASIDE = 0.02  # Of the point aimed at, at most, along each axis of C [m].
 ROLL = np.deg2rad(12.0)  # At most.
 SCALE = (0.87, 1.15)  # Where the part is on the line of sight is known to some 4 cm.
+ELSEWHERE, TRIES = 0.5, 4  # Share of close-ups in other surroundings; tries to find some.
 LIGHTEST_SHADOW, DARKEST_SHADOW = 0.9, 0.35  # What is left of the light.
 
 
@@ -64,6 +67,9 @@ def batch(
         close_up = CloseUp.of(p_CAim, up_C, card.size, scale, roll)
         image = close_up.taken(view.color, pinhole).astype(np.float32)
         seen = close_up.taken(view.visible, pinhole, smooth=False) > 0
+        if rng.random() < ELSEWHERE:
+            around = _surroundings(views, pinhole, card, rng)
+            image = np.where(seen[..., None], image, around)
         seen &= ~_covered(image, seen, rng)
         keypoints = close_up.pinhole.project((close_up.X_CV.inverse() @ view.X_CP @ p_PK.T).T)
         middle = card.stride // 2
@@ -73,6 +79,23 @@ def batch(
         directions.append(unit.transpose(0, 3, 1, 2).reshape(-1, count, count))
         images.append(_developed(image, rng))
     return Batch(np.array(images), np.array(masks, np.float32), np.array(directions, np.float32))
+
+
+def _surroundings(
+    views: Sequence[LabelledView], pinhole: Pinhole, card: KeypointCard, rng: np.random.Generator
+) -> NDArray[np.float32]:
+    """Return a close-up in which no part is seen; of one colour if there is none."""
+    for _ in range(TRIES):
+        view = views[rng.integers(len(views))]
+        pixel = rng.uniform(0.0, [pinhole.width, pinhole.height])
+        ray = np.r_[(pixel - [pinhole.cx, pinhole.cy]) / pinhole.focal_length, 1.0]
+        p_CAim = np.linalg.norm(view.X_CP.translation()) / np.linalg.norm(ray) * ray
+        up_C, roll = view.X_CD.rotation().matrix()[:, 2], rng.uniform(-np.pi, np.pi)
+        scale = card.pixels_per_metre * rng.uniform(0.7, 2.0)
+        close_up = CloseUp.of(p_CAim, up_C, card.size, scale, roll)
+        if not close_up.taken(view.visible, pinhole, smooth=False).any():
+            return close_up.taken(view.color, pinhole).astype(np.float32)
+    return np.full((card.size, card.size, 3), rng.uniform(0.0, 255.0), np.float32)
 
 
 def _covered(
