@@ -1,9 +1,9 @@
 """Train a net that finds a part's keypoints: ``python -m experiments.train_keypoints DATASET``.
 
-DATASET is a folder that ``python -m experiments.collect_views`` has filled. The pictures of its
-last placements are kept from training; on them the net is judged. Written to ``--out`` are
-`PART.onnx`, its card `PART.json`, and a checkpoint. What was interrupted, or reached the end of its
-``--minutes``, goes on when the command is given again, as if it had not stopped.
+DATASET is a folder that ``python -m experiments.collect_views`` has filled. The pictures of the
+last placements of each posture are kept from training; on them the net is judged. Written to
+``--out`` are `PART.onnx`, its card `PART.json`, and a checkpoint. What was interrupted, or reached
+the end of its ``--minutes``, goes on when the command is given again, as if it had not stopped.
 
 It needs PyTorch and the package onnx, in an environment of their own: docs/guide/keypoints.md.
 """
@@ -40,7 +40,7 @@ from planning.perception.surface import Surface
 PRODUCT = "motor_unit"
 CHECKPOINT = "checkpoint.pt"
 NEEDED = ("torch", "onnx")
-KEPT_SHARE = 6  # One placement of so many is kept from training, but at least one [A].
+KEPT_SHARE = 6  # Of each posture, one placement of so many is kept, but at least one [A].
 STRIDE, COARSEST = 4, 16  # Of the network's output, and of what is deepest in it [pixels].
 SMALLEST = 64  # Close-up [pixels] [A].
 
@@ -129,20 +129,19 @@ def run(options: Options) -> int:
 
 
 def split(views: Sequence[LabelledView]) -> tuple[list[LabelledView], list[LabelledView]]:
-    """Return the views to learn from, and those to judge by: the last placements.
+    """Return the views to learn from, and those to judge by: the last placements of each posture.
 
     Raises:
-        InputError: There is one placement only.
+        InputError: A posture has one placement only.
     """
-    scenes = sorted({view.scene for view in views})
-    if len(scenes) < 2:
-        raise InputError(
-            "The dataset has one placement only, another is needed to judge by: collect more "
-            "--views."
-        )
-    first_kept = scenes[-max(1, len(scenes) // KEPT_SHARE)]
-    learned = [view for view in views if view.scene < first_kept]
-    return learned, [view for view in views if view.scene >= first_kept]
+    kept: set[int] = set()
+    for case in sorted({view.case for view in views}):
+        scenes = sorted({view.scene for view in views if view.case == case})
+        if len(scenes) < 2:
+            raise InputError(f"{case} has one placement only, one more is needed: collect --views.")
+        kept |= set(scenes[-max(1, len(scenes) // KEPT_SHARE) :])
+    learned = [view for view in views if view.scene not in kept]
+    return learned, [view for view in views if view.scene in kept]
 
 
 def _check(options: Options) -> None:

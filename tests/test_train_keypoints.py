@@ -26,7 +26,7 @@ from planning.perception.surface import Surface
 from planning.perception.voting import vote
 
 PINHOLE = Pinhole.centred(212, 120, 106.0)
-SCENES, PER_SCENE = 3, 2
+SCENES, PER_SCENE = 5, 2
 
 
 @pytest.fixture(scope="module")
@@ -50,7 +50,8 @@ def dataset(tmp_path_factory: pytest.TempPathFactory, mesh: trimesh.Trimesh) -> 
             depth = np.where(mask, 0.25, 0.0)
             images.append(LabelledImage(color, depth, X_DC.inverse(), X_CP, mask, mask))
         write_scene(root, scene, images, PINHOLE, 1, box_centre(mesh))
-    record = {"status": "complete", "made_from": {"part": "motor/P2"}}
+    scenes = {str(k): {"case": f"motor/P{1 + k % 2}"} for k in range(SCENES)}
+    record = {"status": "complete", "made_from": {"part": "motor"}, "scenes": scenes}
     (root / "collection.json").write_text(json.dumps(record))
     return root
 
@@ -70,9 +71,10 @@ def read(dataset: Path, mesh: trimesh.Trimesh) -> LabelledViews:
 
 
 def test_views_are_read_as_they_were_written(read: LabelledViews, mesh: trimesh.Trimesh) -> None:
-    assert [view.scene for view in read.views] == [0, 0, 1, 1, 2, 2]
+    assert [view.scene for view in read.views] == [0, 0, 1, 1, 2, 2, 3, 3, 4, 4]
     assert read.pinhole == PINHOLE
-    assert read.about["pictures"] == SCENES * PER_SCENE and read.about["placements"] == SCENES
+    assert read.about["pictures"] == SCENES * PER_SCENE
+    assert read.about["placements"] == {"motor/P1": 3, "motor/P2": 2}
     for view in read.views:
         assert (_hull(PINHOLE.project((view.X_CP @ mesh.vertices.T).T)) == (view.visible > 0)).all()
         np.testing.assert_allclose((view.X_CD.inverse() @ view.X_CP).translation(), 0.0, atol=1e-6)
@@ -81,10 +83,10 @@ def test_views_are_read_as_they_were_written(read: LabelledViews, mesh: trimesh.
 def test_part_and_placements_to_judge_by(dataset: Path, read: LabelledViews) -> None:
     assert part_of(dataset) == "motor"
     learned, kept = train_keypoints.split(read.views)
-    assert [view.scene for view in learned] == [0, 0, 1, 1]
-    assert [view.scene for view in kept] == [2, 2]
-    with pytest.raises(InputError, match="one placement only"):
-        train_keypoints.split(read.views[:2])
+    assert [view.scene for view in learned] == [0, 0, 1, 1, 2, 2]
+    assert [view.scene for view in kept] == [3, 3, 4, 4]  # One of each posture.
+    with pytest.raises(InputError, match="motor/P2 has one placement only"):
+        train_keypoints.split(read.views[:6])
 
 
 def test_close_ups_say_where_keypoints_are(read: LabelledViews, mesh: trimesh.Trimesh) -> None:
@@ -93,7 +95,7 @@ def test_close_ups_say_where_keypoints_are(read: LabelledViews, mesh: trimesh.Tr
     again = [batch(read.views, PINHOLE, card, np.random.default_rng(4)) for _ in range(2)]
     drawn = again[0]
     assert all(np.array_equal(getattr(drawn, n), getattr(again[1], n)) for n in vars(drawn))
-    assert drawn.images.shape == (6, 128, 128, 3) and drawn.directions.shape == (6, 18, 32, 32)
+    assert drawn.images.shape == (10, 128, 128, 3) and drawn.directions.shape == (10, 18, 32, 32)
     other = batch(read.views, PINHOLE, card, np.random.default_rng(5))
     assert (other.images != drawn.images).mean() > 0.5
     p_PK = np.array(card.p_PK)

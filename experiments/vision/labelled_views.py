@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+from collections import Counter
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -35,6 +36,7 @@ class LabelledView:
         X_CP: Where the part is, by its label.
         X_CD: Where the board is.
         scene: Number of the placement that it was taken of.
+        case: Posture in that, for example "motor/P2".
     """
 
     color: NDArray[np.uint8]
@@ -42,6 +44,7 @@ class LabelledView:
     X_CP: RigidTransform
     X_CD: RigidTransform
     scene: int
+    case: str
 
 
 @dataclass(frozen=True, eq=False)
@@ -51,7 +54,8 @@ class LabelledViews:
     Attributes:
         views: In the order of the dataset.
         pinhole: Of the camera.
-        about: What is said of it on a net's card: folder, pictures, placements, fingerprint.
+        about: What is said of it on a net's card: folder, pictures, placements by posture,
+            fingerprint.
     """
 
     views: list[LabelledView]
@@ -89,7 +93,7 @@ def read_views(root: Path, mesh: trimesh.Trimesh) -> LabelledViews:
         InputError: Something is missing, cannot be read, or shows a part of another size.
     """
     X_OP, sums, views = box_centre(mesh).inverse(), hashlib.sha256(), []
-    camera = _load(root / "camera.json")
+    camera, record = _load(root / "camera.json"), _load(root / RECORD)
     scenes = sorted(path for path in (root / SPLIT).glob("[0-9]*") if path.is_dir())
     if not scenes:
         raise InputError(f"'{root / SPLIT}' has no scenes.")
@@ -98,6 +102,7 @@ def read_views(root: Path, mesh: trimesh.Trimesh) -> LabelledViews:
             camera["width"], camera["height"], camera["fx"], camera["cx"], camera["cy"]
         )
         for folder in scenes:
+            case = record["scenes"][str(int(folder.name))]["case"]
             labels, cameras = (
                 _load(folder / name) for name in ("scene_gt.json", "scene_camera.json")
             )
@@ -110,13 +115,13 @@ def read_views(root: Path, mesh: trimesh.Trimesh) -> LabelledViews:
                 color = _image(folder / "rgb" / f"{int(number):06d}.png", 3)
                 seen = _image(folder / "mask_visib" / f"{int(number):06d}_000000.png", 2)
                 sums.update(color.tobytes())
-                views.append(LabelledView(color, seen, X_CO @ X_OP, X_CD, int(folder.name)))
+                views.append(LabelledView(color, seen, X_CO @ X_OP, X_CD, int(folder.name), case))
     except (KeyError, ValueError, TypeError, IndexError) as error:
         raise InputError(f"'{root}' is not what collect_views writes: {error}.") from error
     about = {
         "folder": root.name,
         "pictures": len(views),
-        "placements": len(scenes),
+        "placements": dict(Counter(record["scenes"][str(int(s.name))]["case"] for s in scenes)),
         "sha256": sums.hexdigest(),
     }
     return LabelledViews(views, pinhole, about)

@@ -86,7 +86,7 @@ def _surroundings(
 ) -> NDArray[np.float32]:
     """Return a close-up in which no part is seen; of one colour if there is none."""
     for _ in range(TRIES):
-        view = views[rng.integers(len(views))]
+        view = views[int(rng.integers(len(views)))]
         pixel = rng.uniform(0.0, [pinhole.width, pinhole.height])
         ray = np.r_[(pixel - [pinhole.cx, pinhole.cy]) / pinhole.focal_length, 1.0]
         p_CAim = np.linalg.norm(view.X_CP.translation()) / np.linalg.norm(ray) * ray
