@@ -9,15 +9,18 @@ from scipy.spatial.transform import Rotation
 from cell.errors import InputError
 from cell.machines.cameras.camera import Picture
 from cell.machines.cameras.pinhole import Pinhole, looking_at
+from cell.machines.cameras.rendering import rendering_problem  # noqa: F401
 from planning.perception.belief import Estimate
 from planning.perception.close_up import CloseUp
 from planning.perception.estimators import ASTRAY, ByBoth, ByDepth, ByKeypoints
 from planning.perception.keypoint_card import KEYPOINTS, KeypointCard, farthest_points
 from planning.perception.keypoint_net import KeypointNet, Seen, centres
 from planning.perception.keypoint_pose import pose_of_keypoints
+from planning.perception.part_alone import PartAlone
 from planning.perception.surface import Surface
 from planning.perception.voting import Keypoints, vote
 
+needs_rendering = pytest.mark.skipif("rendering_problem() is not None", reason="no rendering here")
 CLOSE = Pinhole.centred(128, 128, 330.0)
 WIDE = Pinhole.centred(848, 480, 424.0)
 RNG = np.random.default_rng
@@ -143,6 +146,20 @@ def test_close_ups_see_points_where_the_picture_does() -> None:
         np.testing.assert_allclose(seen, expected, atol=0.05)  # Half a pixel would be seen.
     middle = close_up.pinhole.project((close_up.X_CV.inverse() @ p_CAim)[None])[0]
     np.testing.assert_allclose(middle, 63.5, atol=1e-9)
+
+
+@needs_rendering
+def test_close_ups_show_what_a_camera_that_is_turned_there_renders(bracket) -> None:
+    """Drake counts pixels from a corner. They are of different sizes here, so that would be seen."""
+    X_CP = looking_at([0.1, -0.2, 0.25], [0.02, 0.0, 0.0]).inverse()
+    close_up = CloseUp.of(X_CP @ np.zeros(3), X_CP.rotation().matrix()[:, 2], 256, 3000.0)
+    alone = PartAlone(bracket)
+    (whole,) = alone.depths(WIDE, [X_CP])
+    (turned,) = alone.depths(close_up.pinhole, [close_up.X_CV.inverse() @ X_CP])
+    taken = close_up.taken((whole > 0.0).astype(np.float64), WIDE)
+    middles = [np.array([(k * m).sum() for k in np.indices(m.shape)]) / m.sum()
+               for m in (taken, (turned > 0.0).astype(float))]  # fmt: skip
+    np.testing.assert_allclose(*middles, atol=0.1)
 
 
 def test_close_ups_are_upright_however_the_camera_is_turned() -> None:
