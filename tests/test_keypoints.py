@@ -150,7 +150,7 @@ def test_close_ups_see_points_where_the_picture_does() -> None:
 
 @needs_rendering
 def test_close_ups_show_what_a_camera_that_is_turned_there_renders(bracket) -> None:
-    """Drake counts pixels from a corner. They are of different sizes here, so that would be seen."""
+    """Drake counts pixels from a corner, which shows where they are of different sizes."""
     X_CP = looking_at([0.1, -0.2, 0.25], [0.02, 0.0, 0.0]).inverse()
     close_up = CloseUp.of(X_CP @ np.zeros(3), X_CP.rotation().matrix()[:, 2], 256, 3000.0)
     alone = PartAlone(bracket)
