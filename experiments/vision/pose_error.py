@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from pydrake.math import RigidTransform, RotationMatrix
+from scipy.spatial import KDTree
 from scipy.spatial.transform import Rotation
 
 from cell.machines.cameras.pinhole import Pinhole
@@ -25,6 +26,8 @@ class PoseError:
         yaw_deg: Its component about the vertical.
         tilt_deg: The rest.
         add_share: Mean distance of the surface's points (ADD) by the part's diameter.
+        adds_share: The same with each point's nearest instead of itself (ADD-S): a part that hardly
+            changes when it is turned, as a round one about its axis, may be turned.
         pixels: Mean distance of their projections.
         normalised: Its square by the estimate's covariance, in six degrees of freedom.
     """
@@ -34,6 +37,7 @@ class PoseError:
     yaw_deg: float
     tilt_deg: float
     add_share: float
+    adds_share: float
     pixels: float
     normalised: float
 
@@ -75,6 +79,7 @@ def pose_error(
         yaw_deg=float(np.rad2deg(abs(turn_W[2]))),
         tilt_deg=float(np.rad2deg(np.linalg.norm(turn_W[:2]))),
         add_share=float(np.linalg.norm(found - true, axis=1).mean()) / diameter,
+        adds_share=float(np.mean(KDTree(found).query(true)[0])) / diameter,
         pixels=float(np.linalg.norm(seen - meant, axis=1).mean()),
         normalised=float(error @ np.linalg.solve(covariance, error)),
     )
