@@ -134,7 +134,7 @@ class Block:
 
     def step(self, force: np.ndarray, lever: float = 0.0) -> None:
         """Advance by one step under a force [N] at the bottom of the block, `lever` [m] aside."""
-        pressed = SpatialForce(np.zeros(3), [0.0, 0.0, -PRESS])
+        pressed = SpatialForce(np.zeros(3), np.array([0.0, 0.0, -PRESS]))
         pulled = SpatialForce(np.zeros(3), force)
         at = np.array([0.0, 0.0, -SIZE[2] / 2])
         forces = [

@@ -301,25 +301,6 @@ def test_torque_limits_slow_a_loaded_arm_and_refuse_what_it_cannot_carry(
         run(30.0)
 
 
-def test_a_corner_beside_a_tiny_step_is_run_with_stops(model: CollisionModel) -> None:
-    """Out of a narrow place a planner may find a way that begins with a third of a milliradian."""
-    arm = model.arms["right"]
-    waypoints = np.array(
-        [
-            [-0.6234, -1.6547, 1.3861, -1.3027, -1.5708, 0.9475],
-            [-0.6234, -1.6547, 1.3859, -1.3025, -1.5710, 0.9475],
-            [-0.5997, -1.6077, 1.3386, -1.3027, -1.5736, 0.9710],
-            [-0.5909, -1.5948, 1.3303, -1.3063, -1.5708, 0.9799],
-        ]
-    )
-    motion = time_path(arm, model.context, JointPath.through(waypoints, 0.1), PACE)
-    assert motion.duration < 1.0
-    assert (np.diff(motion.time) > 0.0).all()
-    np.testing.assert_allclose(motion.q[[0, -1]], waypoints[[0, -1]], atol=1e-9)
-    for point in waypoints:
-        assert np.abs(motion.q - point).max(axis=1).min() < 2e-3
-
-
 def test_shapes_left_out_of_the_arm_change_no_motion(
     model: CollisionModel, monkeypatch: pytest.MonkeyPatch
 ) -> None:
