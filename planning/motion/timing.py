@@ -178,12 +178,12 @@ def time_path(
         time_path(
             arm,
             context,
-            JointPath.through(segment, 0.0),
+            JointPath.through(path.waypoints[k : k + 2], 0.0),
             pace,
             payload=payload,
             tool_limit=tool_limit,
         )
-        for segment in zip(path.waypoints, path.waypoints[1:], strict=False)
+        for k in range(len(path.waypoints) - 1)
     )
 
 
