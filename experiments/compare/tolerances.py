@@ -53,7 +53,7 @@ NAMED = (
 BY_UNIT = (
     Tolerance("cog_height_m", 1e-6, 0.0, "geometry without simulation: only rounding differs"),
     Tolerance("*_N_m", 0.02, 0.05, "the clutch trips within a step of its torque"),
-    Tolerance("*_m_per_s", 2e-3, 0.2, "a twentieth of the kick that is allowed"),
+    Tolerance("*_m_per_s", 2e-3, 0.2, "a tenth of the kick that is allowed"),
     Tolerance("*_m", 3e-4, 0.05, "the jump that a part may make when it is let go"),
     Tolerance("*_rad", 0.01, 0.05, "half a degree is the scatter due to the grasp"),
     Tolerance("*_N", 1.0, 0.15, "a peak of contact, averaged over 10 ms"),
