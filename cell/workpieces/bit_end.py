@@ -62,9 +62,9 @@ class BitEnd:
         )
         # It meets what the rest of the bit meets: not the tool that it is part of.
         inspector = scene_graph.model_inspector()
-        (rest, *_) = set(plant.GetCollisionGeometriesForBody(bit_frame.body())) - {geometry}
+        rest = plant.GetCollisionGeometriesForBody(bit_frame.body())[:1]  # Itself, of a bare bit.
         others = inspector.GetAllGeometryIds(Role.kProximity)
-        unmet = [other for other in others if inspector.CollisionFiltered(rest, other)]
+        unmet = [o for o in others for one in rest if inspector.CollisionFiltered(one, o)]
         filters = CollisionFilterDeclaration()
         filters.ExcludeBetween(GeometrySet(geometry), GeometrySet(unmet))
         scene_graph.collision_filter_manager().Apply(filters)
