@@ -28,7 +28,7 @@ from cell.machines.devices import add_arms, make_drives
 from cell.machines.drive import JointDrive
 from cell.machines.driver import Driver
 from cell.machines.gripper import Gripper
-from cell.machines.jig_base import JigBase, fit_to_bag, set_sliding_friction
+from cell.machines.jig_base import JigBase, fit_to_bag, stand_on
 from cell.machines.sensors import WrenchSensor
 from cell.machines.workcell import add_workcell
 from cell.monitor import Monitor, StepCounter
@@ -185,8 +185,7 @@ def add_cell(
     workcell = add_workcell(plant, config, product.tray)
     fit_to_bag(plant, scene_graph, workcell.base, config.jig.bag)
     if not config.workcell.jig_base_fixed:
-        for sliding in (workcell.plate, workcell.base):
-            set_sliding_friction(plant, scene_graph, sliding, config.push.base_friction)
+        stand_on(plant, scene_graph, workcell.plate, workcell.base, config)
     arms = add_arms(plant, config, drives)
     parts = add_parts(plant, product, config.workcell.X_WT)
     drivers = [arm.tool for arm in arms.values() if isinstance(arm.tool, Driver)]

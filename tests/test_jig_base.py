@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from pydrake.geometry import Cylinder
 from pydrake.math import RigidTransform
+from pydrake.multibody.math import SpatialVelocity
 
 from cell import Cell, CellConfig, build_cell, load_product
 from cell.fixtures.jig_dimensions import BASE_DIAMETER
@@ -14,8 +15,9 @@ from cell.simulation.simulation import Simulation
 from planning.operations.stroke import Stroke
 
 
-def empty_cell(fixed: bool) -> Cell:
-    config = CellConfig.load(overrides=[f"workcell.jig_base_fixed={str(fixed).lower()}"])
+def empty_cell(fixed: bool, **changes: float) -> Cell:
+    config = CellConfig().with_changes({"workcell.jig_base_fixed": fixed})
+    config = config.with_changes({f"simulation.{key}": value for key, value in changes.items()})
     product = replace(load_product("motor_unit"), parts={}, joints=(), groups={})
     return build_cell(config, product)
 
@@ -64,6 +66,38 @@ def test_a_sleeping_base_does_not_move_and_goes_on_from_rest() -> None:
     for _ in range(50):
         simulation.step()
     assert base.X_WJ(simulation.context).IsNearlyEqualTo(before, 1e-4)
+
+
+def test_a_base_that_lands_while_it_slides_is_not_braked_by_the_step() -> None:
+    """It tips on its edge and falls back: friction stays what the mean normal force bears."""
+    speed, tipping, radius = 0.1, 0.2, BASE_DIAMETER / 2
+    travel = {}
+    for step in (1e-3, 5e-4):
+        cell = empty_cell(fixed=False, time_step=step)
+        simulation = settled(cell, round(0.05 / step))
+        context, body = simulation.context, cell.jig_base.body
+        before = cell.jig_base.X_WJ(context).translation()
+        V_WJ = SpatialVelocity([0.0, -tipping, 0.0], [speed, 0.0, tipping * radius])
+        cell.plant.SetFreeBodySpatialVelocity(context, body, V_WJ)
+        for _ in range(round(0.2 / step)):
+            simulation.step()
+        travel[step] = (cell.jig_base.X_WJ(context).translation() - before)[0]
+    flat = speed**2 / (2 * cell.config.push.base_friction * 9.81)
+    assert travel[1e-3] == pytest.approx(travel[5e-4], rel=0.2)
+    assert travel[1e-3] > 0.9 * flat  # 1.25 and 1.43 mm, 1.27 mm flat; rigid on rigid 0.3 mm.
+
+
+def test_joint_of_the_base_yields_by_its_stiffness() -> None:
+    """Gravity times five, in place of a load: the base sinks by the weight over the stiffness."""
+    cell = empty_cell(fixed=False)
+    heights = []
+    for gravity in (9.81, 49.05):
+        cell.plant.mutable_gravity_field().set_gravity_vector([0.0, 0.0, -gravity])
+        simulation = settled(cell)
+        heights.append(cell.jig_base.X_WJ(simulation.context).translation()[2])
+    push = cell.config.push
+    sunk = push.jig_mass * 4 * 9.81 / push.base_stiffness
+    assert heights[0] - heights[1] == pytest.approx(sunk, rel=0.1)
 
 
 def test_a_bolted_base_neither_sleeps_nor_moves() -> None:

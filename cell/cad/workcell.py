@@ -53,10 +53,9 @@ RISER_SIZE = (0.26, 0.26, J_HEIGHT + RISER_TOP)
 
 # Rigid: every part that is set down has a compliant side. Friction of metal on metal [A].
 STATIC_CONTACT = LinkContact("rigid", friction=0.3, hint=0.05)
-# Compliant, so that a sliding jig rests on an area instead of a point; as stiff as hard rubber
-# feet. Thirteen sectors: with three it tips over the edges of a triangle [M]. With less dissipation
-# it rocks and slams at hundreds of newtons while it is pushed [M]. Friction of
-# the base on the force plate 0.3 [A].
+# Compliant, so that a sliding jig rests on an area instead of a point; its joint with the force
+# plate is softer, see `cell.machines.jig_base.stand_on`. Thirteen sectors: with three it tips over
+# the edges of a triangle [M]. Friction 0.3 [A].
 JIG_CONTACT = LinkContact("compliant", friction=0.3, modulus=1e8, dissipation=100.0, hint=0.04)
 
 

@@ -33,6 +33,12 @@ class PushConfig:
         "[A] 0.4, plausible 0.3-0.6.",
         above=0.0, at_most=2.0,
     )  # fmt: skip
+    base_stiffness: float = setting(
+        3e6, "N/m", "Of the dry joint between base and force plate, against the base as a whole.",
+        "[R] Load / (0.5 rms unevenness) (Persson 2007): 15 N on 10 um; plausible 1e6-1e7. Above "
+        "3e6 a step of 1 ms is too long for it [M].",
+        above=0.0, at_most=1e8,
+    )  # fmt: skip
     speed: float = setting(
         0.28, "m/s", "Speed of the hand at the end of the push.",
         "[D] Coasting by 8 mm past 70 [S] asks for 0.22-0.29.",

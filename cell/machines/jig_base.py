@@ -5,7 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from pydrake.geometry import Cylinder, ProximityProperties, RoleAssign, SceneGraph
+from pydrake.geometry import (
+    AddCompliantHydroelasticProperties,
+    AddContactMaterial,
+    Box,
+    Cylinder,
+    ProximityProperties,
+    RoleAssign,
+    SceneGraph,
+)
 from pydrake.math import RigidTransform
 from pydrake.multibody.math import SpatialVelocity
 from pydrake.multibody.plant import CoulombFriction, MultibodyPlant
@@ -16,6 +24,10 @@ from cell.configuration.config import CellConfig
 from cell.fixtures.jig_dimensions import BASE_DIAMETER, BASE_HEIGHT, BEAD_MASS
 from cell.fixtures.soft_jig.parameters import BadJig, BagParameters
 from cell.sleep import Sleep
+
+# Hunt-Crossley, of base and plate: damps rocking at half its critical value; air is squeezed out of
+# the joint [A].
+JOINT_DISSIPATION = 100.0  # [s/m]
 
 
 @dataclass(frozen=True)
@@ -125,14 +137,35 @@ def fit_to_bag(
         scene_graph.ChangeShape(plant.get_source_id(), geometry, wider)
 
 
-def set_sliding_friction(
-    plant: MultibodyPlant, scene_graph: SceneGraph, body: RigidBody, friction: float
+def stand_on(
+    plant: MultibodyPlant,
+    scene_graph: SceneGraph,
+    plate: RigidBody,
+    base: RigidBody,
+    config: CellConfig,
 ) -> None:
-    """Set the friction of a body's collision geometries, before the plant is finalized."""
-    inspector = scene_graph.model_inspector()
-    for geometry in plant.GetCollisionGeometriesForBody(body):
+    """Give the joint of a free base and the force plate its friction and its stiffness.
+
+    The joint is soft, not the base: two dry faces that touch under a few hundred pascals meet at
+    few of their high points. It is in the plate's surface, which only a fallen part touches besides.
+    A joint stiffer than the step resolves brakes a rocking base: the friction of a step is bounded
+    by the normal force at its beginning, which is many times the true one when a corner lands.
+
+    Call it before the plant is finalized.
+    """
+    inspector, push = scene_graph.model_inspector(), config.push
+    material = CoulombFriction(push.base_friction, push.base_friction)
+    for geometry in plant.GetCollisionGeometriesForBody(base):
         properties = ProximityProperties(inspector.GetProximityProperties(geometry))
-        material = CoulombFriction(friction, friction)
         properties.UpdateProperty("material", "coulomb_friction", material)
-        source = plant.get_source_id()
-        scene_graph.AssignRole(source, geometry, properties, RoleAssign.kReplace)
+        scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)
+    gradient = push.base_stiffness / (np.pi * BASE_DIAMETER**2 / 4)
+    for geometry in plant.GetCollisionGeometriesForBody(plate):
+        box = inspector.GetShape(geometry)
+        assert isinstance(box, Box)
+        # Drake's pressure rises to the modulus from the face to the middle of a box.
+        modulus = gradient * min(box.size()) / 2
+        properties = ProximityProperties()
+        AddCompliantHydroelasticProperties(max(box.size()), modulus, properties)
+        AddContactMaterial(JOINT_DISSIPATION, None, material, properties)
+        scene_graph.AssignRole(plant.get_source_id(), geometry, properties, RoleAssign.kReplace)

@@ -33,7 +33,7 @@ from cell.link_policy import add_links
 from cell.machines.drive import JointDrive
 from cell.machines.gripper import Gripper, GripperDrive
 from cell.machines.grippers import HAND_E
-from cell.machines.jig_base import JigBase, fit_to_bag, set_sliding_friction
+from cell.machines.jig_base import JigBase, fit_to_bag, stand_on
 from cell.machines.sensors import WrenchSensor
 from cell.machines.workcell import add_workcell
 from cell.monitor import Monitor, StepCounter
@@ -163,8 +163,7 @@ def build_push_rig(
     plant, scene_graph = AddMultibodyPlant(plant_config(config), builder)
     workcell = add_workcell(plant, config, tray=None)
     fit_to_bag(plant, scene_graph, workcell.base, config.jig.bag)
-    for sliding in (workcell.plate, workcell.base):
-        set_sliding_friction(plant, scene_graph, sliding, config.push.base_friction)
+    stand_on(plant, scene_graph, workcell.plate, workcell.base, config)
     alone = replace(product, parts={part: product.parts[part]}, joints=())
     (loose,) = add_parts(plant, alone, config.workcell.X_WT)
     kind = config.workcell.fixture
