@@ -147,7 +147,8 @@ def stand_on(
     """Give the joint of a free base and the force plate its friction and its stiffness.
 
     The joint is soft, not the base: two dry faces that touch under a few hundred pascals meet at
-    few of their high points. It is in the plate's surface, which only a fallen part touches besides.
+    few of their high points. The compliance is in the plate's surface: but for a fallen part,
+    nothing else touches it.
     A joint stiffer than the step resolves brakes a rocking base: the friction of a step is bounded
     by the normal force at its beginning, which is many times the true one when a corner lands.
 
