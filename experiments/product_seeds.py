@@ -12,12 +12,9 @@ fixed part; ``products.json`` holds it.
 
 from __future__ import annotations
 
-import json
 import sys
-import time
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
-from pathlib import Path
+from dataclasses import dataclass, field
 from typing import Annotated
 
 import tyro
@@ -25,40 +22,19 @@ from rich.console import Console
 from rich.table import Table
 from tyro.conf import FlagCreatePairsOff, OmitArgPrefixes, arg
 
-from cell.configuration.config import CellConfig
 from cell.errors import UnknownName
-from cell.products.loading import load_product
 from experiments.campaigns.campaign import run_campaign
 from experiments.campaigns.points import trials
 from experiments.campaigns.trial import Row
 from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
-from experiments.product.check import find
+from experiments.product.drafting import Draft, drafted
 from experiments.product.drawings import KINDS
-from experiments.product.init import PRODUCT_FILE, Wanted, run_init
-from experiments.product.random_drawing import write_cad
 from experiments.reporting.output import output_folder, write_json
-from planning.product_check.finding import Level
 
 TABLE = "products.json"
-DRAFT = "draft.json"  # Of one product: what drafting and checking it took and said.
 FORCES = ("insertion_force_peak_N", "press_force_peak_N")
 MOVED = "base_moved_since_placed_m"
-
-
-@dataclass(frozen=True)
-class Draft:
-    """A product that was drafted and checked.
-
-    Attributes:
-        file: Of the product.
-        seconds: CPU time of init and check [s].
-        against: What `check` says would fail.
-    """
-
-    file: str
-    seconds: tuple[float, float]
-    against: list[str]
 
 
 @dataclass(frozen=True)
@@ -81,7 +57,7 @@ def run(options: Options) -> int:
     """Assemble, print and write the table; return 0 if every run of every kind succeeded, else 1.
 
     Raises:
-        InputError: An option is invalid, or a product cannot be drafted.
+        InputError: An option is invalid.
     """
     check_counts(options, "seeds", "workers")
     for name in options.kind:
@@ -91,9 +67,10 @@ def run(options: Options) -> int:
     seeds = range(common.seed, common.seed + options.seeds)
     console = Console(quiet=common.quiet, highlight=False)
     with output_folder(common.out, TABLE) as out:
-        drafts = {
-            name: drafted(name, out / name.replace(" ", "_"), config) for name in options.kind
-        }
+        drafts = {}
+        for name in options.kind:
+            kind, folder = KINDS[name], out / name.replace(" ", "_")
+            drafts[name] = drafted(kind.draw(), folder, config, materials=kind.materials)
         wanted = {
             name: trials("assemble", product=draft.file, config=config, seeds=seeds)
             for name, draft in drafts.items()
@@ -110,26 +87,6 @@ def run(options: Options) -> int:
     console.print(table_of(lines))
     done = [line["succeeded"] == options.seeds for line in lines]
     return 0 if all(done) else 1
-
-
-def drafted(name: str, folder: Path, config: CellConfig) -> Draft:
-    """Draw, draft and check a product, unless that was done in this folder."""
-    own, said = folder / "own", folder / DRAFT
-    if said.exists():
-        kept = json.loads(said.read_text())
-        return Draft(kept["file"], tuple(kept["seconds"]), kept["against"])
-    kind = KINDS[name]
-    cad = write_cad(kind.draw(), folder / "cad")
-    clock = [time.process_time()]
-    run_init(Wanted(cad, "mm", kind.materials), own, config, quiet=True)
-    clock.append(time.process_time())
-    found = find(load_product(own / PRODUCT_FILE), None, config, 0)
-    clock.append(time.process_time())
-    against = [f"{f.subject}: {f.text}" for f in found if f.level is Level.FAILS]
-    seconds = clock[1] - clock[0], clock[2] - clock[1]
-    draft = Draft(str(own / PRODUCT_FILE), seconds, against)
-    write_json(said, asdict(draft))
-    return draft
 
 
 def line_of(name: str, draft: Draft, rows: Sequence[Row]) -> dict[str, object]:

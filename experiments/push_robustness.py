@@ -47,6 +47,7 @@ from experiments.reporting.provenance import versions
 PARAMETERS = (
     "push.jig_mass",
     "push.base_friction",
+    "push.base_stiffness",
     "push.speed",
     "push.acceleration",
     "push.start_gap",
@@ -68,11 +69,12 @@ NUMERICS = {
     "approximation similar": {"simulation.contact_approximation": "similar"},
     "approximation sap": {"simulation.contact_approximation": "sap"},
 }
-# What an experimenter could measure, and the values registered with the rule of the push
-# (docs/physics/push_experiment.md), each for one path in the configuration.
+# What an experimenter could measure, and the values registered with the rule of the push, but for
+# the stiffness (docs/physics/push_experiment.md), each for one path in the configuration.
 MEASURABLE: Mapping[str, tuple[float, ...]] = {
     "push.jig_mass": (1.0, 2.5),
     "push.base_friction": (0.3, 0.6),
+    "push.base_stiffness": (1e6,),
     "push.fingertip_height": (0.001, 0.005, 0.010),
     "push.palm_height": (0.030, 0.089),
     "placement.press_force": (16.0, 24.0),

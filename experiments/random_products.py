@@ -1,56 +1,50 @@
 """Products drawn at random, from CAD to the last screw: how many are assembled, what stops others.
 
-    python -m experiments.random_products --count 20 --out out/random
+    python -m experiments.random_products --count 20 --workers 2 --out out/random
 
-Each is drawn, drafted by ``init``, checked, and assembled if the check has nothing against it; no
-file is touched in between. `experiments.product.random_drawing` says what is drawn. The products of
-a seed are the same on every machine. ``random_products.json`` holds the table.
+Each is drawn, drafted by ``init`` and checked; no file is touched in between. What `check` has
+nothing against is assembled, as a campaign: the same command again goes on where it was stopped.
+`experiments.product.random_drawing` says what is drawn. The products of a seed are the same on
+every machine. ``random_products.json`` holds the table.
 """
 
 from __future__ import annotations
 
-import json
 import sys
-import time
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, field
-from pathlib import Path
 from typing import Annotated
 
 import numpy as np
 import tyro
 from rich.console import Console
 from rich.table import Table
-from tyro.conf import OmitArgPrefixes
+from tyro.conf import OmitArgPrefixes, arg
 
-from cell.configuration.config import CellConfig
-from cell.errors import CellError
-from cell.products.loading import load_product
-from experiments.assembly.assemble import run_job
-from experiments.assembly.job import Job
+from experiments.campaigns.campaign import run_campaign
+from experiments.campaigns.points import trials
+from experiments.campaigns.trial import Row
 from experiments.cli.common import Common, check_counts
 from experiments.cli.ending import exit_code
-from experiments.product.check import find
-from experiments.product.init import PRODUCT_FILE, Wanted, run_init
-from experiments.product.random_drawing import draw, write_cad
+from experiments.product.drafting import Draft, drafted
+from experiments.product.random_drawing import Drawing, draw
 from experiments.reporting.output import output_folder, write_json
-from experiments.reporting.result_file import RESULT
-from planning.product_check.finding import Level
 
 TABLE = "random_products.json"
-ASSEMBLED, REFUSED, FAILED = "assembled", "refused", "failed"
+ASSEMBLED, REFUSED, FAILED, CHECKED = "assembled", "refused", "failed", "checked"
 GOAL = 0.7  # [A] Share that is to be assembled.
 
 
 @dataclass(frozen=True)
-class Trial:
+class Line:
     """What became of one product.
 
     Attributes:
         number: Seeds its drawing and its run.
         drawn: What it is.
         parts: How many it has.
-        outcome: "assembled"; "refused" by init or check, before anything was simulated; "failed".
+        outcome: "assembled"; "refused" by init or check, before anything was simulated; "failed";
+            "checked", if no more was asked for.
         reason: Of what stopped it.
         seconds: CPU time of init, check and assembly [s].
     """
@@ -62,12 +56,25 @@ class Trial:
     reason: str
     seconds: tuple[float, float, float]
 
+    @staticmethod
+    def of(number: int, drawing: Drawing, draft: Draft, row: Row | None) -> Line:
+        """Return the line of a product; without a row, of one that was not assembled."""
+        outcome, reason = CHECKED, ""
+        if draft.against:
+            outcome, reason = REFUSED, "; ".join(draft.against)
+        elif row is not None and row.verdict == "success":
+            outcome = ASSEMBLED
+        elif row is not None:
+            outcome, reason = FAILED, f"{row.phase}: {row.evidence}"
+        seconds = (*draft.seconds, row.cpu_seconds if row else 0.0)
+        return Line(number, ", ".join(drawing.text), len(drawing.parts), outcome, reason, seconds)
+
 
 @dataclass(frozen=True)
 class RandomProducts:
     """Draw products, draft, check and assemble them, and say what became of each."""
 
-    count: Annotated[int, tyro.conf.arg(metavar="N")] = 20
+    count: Annotated[int, arg(metavar="N")] = 20
     """How many."""
 
     first: int = 0
@@ -76,81 +83,44 @@ class RandomProducts:
     only_check: bool = False
     """Simulate nothing."""
 
+    workers: Annotated[int, arg(metavar="N")] = 1
+    """Runs at a time. What is done already is not run again."""
+
     common: OmitArgPrefixes[Common] = field(default_factory=Common)
 
     def run(self) -> int:
         """Write the table; return 0 if seven of ten are assembled, else 1."""
-        check_counts(self, "count")
-        config, trials = self.common.load_config(), []
-        console = Console(quiet=self.common.quiet, highlight=False)
-        with output_folder(self.common.out, TABLE) as out:
-            for number in range(self.first, self.first + self.count):
-                trials.append(_trial(number, out / f"product_{number}", config, self.only_check))
-                last = trials[-1]
-                console.print(f"{number}: {last.drawn}: {last.outcome} {last.reason}", markup=False)
-                write_json(out / TABLE, {"trials": [asdict(trial) for trial in trials]})
-        console.print(_table(trials))
-        good = sum(trial.outcome == ASSEMBLED for trial in trials)
-        console.print(f"{good} of {len(trials)} assembled")
-        return 0 if good >= GOAL * len(trials) else 1
+        check_counts(self, "count", "workers")
+        common, numbers = self.common, range(self.first, self.first + self.count)
+        config, console = common.load_config(), Console(quiet=common.quiet, highlight=False)
+        drawings = {number: draw(np.random.default_rng(number)) for number in numbers}
+        with output_folder(common.out, TABLE) as out:
+            drafts, wanted = {}, {}
+            for number, drawing in drawings.items():
+                folder = out / f"product_{number}"
+                draft = drafts[number] = drafted(drawing.parts, folder, config, seed=number)
+                said = "; ".join(draft.against) or "nothing against it"
+                console.print(f"{number}: {', '.join(drawing.text)}: {said}", markup=False)
+                if not draft.against and not self.only_check:
+                    file, seeds = draft.file, [number]
+                    (wanted[number],) = trials("assemble", product=file, config=config, seeds=seeds)
+            todo = list(wanted.values())
+            rows = run_campaign(todo, out, workers=self.workers, console=console)
+            of_key = {row.key: row for row in rows}
+            row_of = {number: of_key[trial.key] for number, trial in wanted.items()}
+            lines = [Line.of(n, drawings[n], drafts[n], row_of.get(n)) for n in numbers]
+            write_json(out / TABLE, {"products": [asdict(line) for line in lines]})
+        console.print(_table(lines))
+        good = sum(line.outcome == ASSEMBLED for line in lines)
+        console.print(f"{good} of {len(lines)} assembled")
+        return 0 if good >= GOAL * len(lines) else 1
 
 
-def _trial(number: int, folder: Path, config: CellConfig, only_check: bool) -> Trial:
-    """Return what becomes of one product."""
-    drawing = draw(np.random.default_rng(number))
-    clock = [time.process_time()]
-
-    def trial(outcome: str, reason: str = "") -> Trial:
-        clock.append(time.process_time())
-        init, check, run = [*np.diff(clock), 0.0, 0.0][:3]
-        drawn, parts = ", ".join(drawing.text), len(drawing.parts)
-        seconds = float(init), float(check), float(run)
-        return Trial(number, drawn, parts, outcome, reason, seconds)
-
-    own = folder / "own"
-    try:
-        source = write_cad(drawing.parts, folder / "cad")
-        run_init(Wanted(source, units="mm"), own, config, quiet=True)
-        clock.append(time.process_time())
-        product = load_product(own / PRODUCT_FILE)
-        found = find(product, None, config, number)
-        against = [f"{f.subject}: {f.text}" for f in found if f.level is Level.FAILS]
-        clock.append(time.process_time())
-    except CellError as error:
-        return trial(REFUSED, str(error))
-    if against or only_check:
-        return trial(REFUSED if against else "checked", "; ".join(against))
-    run = folder / "run"
-    run.mkdir(exist_ok=True)
-    try:
-        run_job(Job(product, None, config, number, run, quiet=True))
-    except CellError as error:
-        return trial(FAILED, str(error))
-    reason = _reason(json.loads((run / RESULT).read_text()))
-    return trial(FAILED if reason else ASSEMBLED, reason)
-
-
-def _reason(result: dict) -> str:  # pyright: ignore[reportMissingTypeArgument]
-    """Return why a run failed, in words; "" for one that did not."""
-    if result["verdict"] == "success":
-        return ""
-    if result.get("failure"):
-        return f"{result['failure']['phase']}: {result['failure']['evidence']}"
-    step = next(step for step in result["steps"] if step["verdict"] != "success")
-    limits = [
-        f"{check['quantity']} = {check['value']:.3g} > {check['limit']:.3g}"
-        if check["value"] is not None
-        else f"{check['quantity']} not measured"
-        for check in step["failed_checks"]
-    ]
-    return f"{step['name']}: {'; '.join(limits)}"
-
-
-def _table(trials: Sequence[Trial]) -> Table:
+def _table(lines: Sequence[Line]) -> Table:
     table = Table("no.", "drawn", "outcome", "CPU s: init, check, run", "reason")
-    for trial in trials:
-        seconds = ", ".join(f"{s:.0f}" for s in trial.seconds)
-        table.add_row(str(trial.number), trial.drawn, trial.outcome, seconds, trial.reason)
+    for line in lines:
+        seconds = ", ".join(f"{s:.0f}" for s in line.seconds)
+        table.add_row(str(line.number), line.drawn, line.outcome, seconds, line.reason)
     return table
 
 

@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from experiments.campaigns.trial import Row
+from experiments.product.drafting import DRAFT, Draft
 from experiments.product.drawings import KINDS
-from experiments.product_seeds import DRAFT, TABLE, Draft, line_of, main
+from experiments.product_seeds import TABLE, line_of, main
 
 KIND = "bar puzzle"
 
