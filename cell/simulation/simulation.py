@@ -34,7 +34,6 @@ from cell.simulation.phase import (
     Spin,
     what_is_missing,
 )
-from cell.simulation.resting import Resting
 
 # Damping of the Cartesian impedance uses these effective masses: dominated by the reflected rotor
 # inertia of 0.1 kg m^2 at a lever of 0.15 to 0.4 m [D].
@@ -129,7 +128,7 @@ class Simulation:
             PhaseFailed: Time out, guard, solver failure or a state that is not finite.
         """
         self.log.phases.append((phase.name, self.time))
-        resting = Resting(self.cell.parts, self.root, phase.awake, self.time_step)
+        self.cell.parts.sleep_all_but(self.root, phase.awake)
         for event in phase.start:
             event(self)
         run = _PhaseRun(self, phase)
@@ -143,7 +142,6 @@ class Simulation:
                 raise SolverFailed(phase.name, f"solver failure: {message}") from error
             if phase.every_step is not None:
                 phase.every_step(self)
-            resting.step()
             sensed = run.sense()
             reason = phase.guard(sensed) if phase.guard else None
             if reason:
