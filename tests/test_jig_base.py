@@ -77,7 +77,9 @@ def test_a_base_that_lands_while_it_slides_is_not_braked_by_the_step() -> None:
         simulation = settled(cell, round(0.05 / step))
         context, body = simulation.context, cell.jig_base.body
         before = cell.jig_base.X_WJ(context).translation()
-        V_WJ = SpatialVelocity([0.0, -tipping, 0.0], [speed, 0.0, tipping * radius])
+        V_WJ = SpatialVelocity(
+            np.array([0.0, -tipping, 0.0]), np.array([speed, 0.0, tipping * radius])
+        )
         cell.plant.SetFreeBodySpatialVelocity(context, body, V_WJ)
         for _ in range(round(0.2 / step)):
             simulation.step()
