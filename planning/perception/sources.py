@@ -23,7 +23,7 @@ def check_source(name: str) -> None:
         UnknownName: There is no such source.
     """
     if name not in SOURCES:
-        raise UnknownName("sensor", name, SOURCES)
+        raise UnknownName("sensor (sensor.source)", name, SOURCES)
 
 
 def source_of(
