@@ -34,9 +34,9 @@ class PushConfig:
         above=0.0, at_most=2.0,
     )  # fmt: skip
     base_stiffness: float = setting(
-        3e6, "N/m", "Of the dry joint between base and force plate, against the base as a whole.",
-        "[R] Load / (0.5 rms unevenness) (Persson 2007): 15 N on 10 um; plausible 1e6-1e7. Above "
-        "3e6 a step of 1 ms is too long for it [M].",
+        3e6, "N/m", "Of the dry joint of force plate and base, one of the paper's size.",
+        "[R] Load / (0.5 rms unevenness) (Persson 2007): 15 N on 10 um; plausible 1e6-1e7. "
+        "1 ms resolves 3e6, not 1e7 [M].",
         above=0.0, at_most=1e8,
     )  # fmt: skip
     speed: float = setting(

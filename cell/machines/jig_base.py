@@ -25,8 +25,8 @@ from cell.fixtures.jig_dimensions import BASE_DIAMETER, BASE_HEIGHT, BEAD_MASS
 from cell.fixtures.soft_jig.parameters import BadJig, BagParameters
 from cell.sleep import Sleep
 
-# Hunt-Crossley, of base and plate: damps rocking at half its critical value; air is squeezed out of
-# the joint [A].
+# Hunt-Crossley, of base and plate: a third of critical damping at the usual stiffness; air is
+# squeezed out of the joint [A].
 JOINT_DISSIPATION = 100.0  # [s/m]
 
 
@@ -152,7 +152,13 @@ def stand_on(
     A joint stiffer than the step resolves brakes a rocking base: the friction of a step is bounded
     by the normal force at its beginning, which is many times the true one when a corner lands.
 
-    Call it before the plant is finalized.
+    Args:
+        plant: Not finalized yet.
+        scene_graph: The plant's.
+        plate: The force plate, of boxes.
+        base: Of the jig, free.
+        config: Of the cell; its `push` has the friction, and the stiffness [N/m] of the joint of a
+            base of the paper's size, from which that per area follows.
     """
     inspector, push = scene_graph.model_inspector(), config.push
     material = CoulombFriction(push.base_friction, push.base_friction)
